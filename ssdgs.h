@@ -1327,7 +1327,16 @@ enum {
     SSDGS__COSINE,
     SSDGS__GLOSS,
     SSDGS__ROWS,
-    SSDGS__OUTS = 10 /* diffuse 3, specular 3, scattering 3, S */
+    /* of what a Gaussian gives: RGB of each term, S */
+    SSDGS__OUT_DIFFUSE = 0,
+    SSDGS__OUT_SPECULAR = 3,
+    SSDGS__OUT_SCATTERING = 6,
+    SSDGS__OUT_SHADOW = 9,
+    SSDGS__OUTS = 10,
+    /* of a deferred lobe, after the six of Q */
+    SSDGS__LOBE_NORMAL = 6,
+    SSDGS__LOBE_FRESNEL = 9,
+    SSDGS__LOBE_SOFTNESS = 10
 };
 
 /* ---- what the kernels are called with ---- */
@@ -1656,8 +1665,7 @@ static int ssdgs__finite(ssdgs_real x) {
 
 /* ==== >>memory  contexts, errors, aligned allocation ==== */
 
-/* Reads desc's allocator and log. Holds messages, notes and buffers that only grow. All other sections call
- * it. */
+/* Reads desc's allocator and log. Holds messages, notes and buffers that only grow. All sections call it. */
 
 #define SSDGS__MESSAGE 512
 
@@ -6013,10 +6021,10 @@ static void ssdgs__lobe_turn(const ssdgs_placed *o, ssdgs_real *lobe) {
             ssdgs_real turned[3];
             ssdgs__turn(o, 0, column, turned);
             for (int c = 0; c <= i; c++) lobe[at[3 * c + i] * SSDGS__BLOCK] = turned[c];
-            n[i] = lobe[(6 + i) * SSDGS__BLOCK];
+            n[i] = lobe[(SSDGS__LOBE_NORMAL + i) * SSDGS__BLOCK];
         }
         ssdgs__turn(o, 0, n, n);
-        for (int i = 0; i < 3; i++) lobe[(6 + i) * SSDGS__BLOCK] = n[i];
+        for (int i = 0; i < 3; i++) lobe[(SSDGS__LOBE_NORMAL + i) * SSDGS__BLOCK] = n[i];
     }
 }
 
@@ -6128,9 +6136,9 @@ static void ssdgs__medium_rows(const ssdgs__lighting *k, const ssdgs_real *weigh
         ssdgs_real sum = 0;
         for (int j = 0; j < SSDGS__LENGTHS; j++)
             sum += weights[c * SSDGS__LENGTHS + j] * transport[j * SSDGS__BLOCK + lane];
-        outs[6 * SSDGS__BLOCK + i] += ssdgs__softplus_scalar(gauss[SSDGS_SCATTERING * SSDGS__BLOCK + i]) *
-                                      sum * rows[SSDGS__IRRADIANCE * SSDGS__BLOCK + lane] * k->intensity[c] *
-                                      (ssdgs_real)0.31830988618379067;
+        outs[SSDGS__OUT_SCATTERING * SSDGS__BLOCK + i] +=
+            ssdgs__softplus_scalar(gauss[SSDGS_SCATTERING * SSDGS__BLOCK + i]) * sum *
+            rows[SSDGS__IRRADIANCE * SSDGS__BLOCK + lane] * k->intensity[c] * (ssdgs_real)0.31830988618379067;
     }
 }
 
@@ -6219,8 +6227,9 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
         ssdgs__ambient_at(frame->options.ambient, mirrored[s], shine);
         for (int c = 0; c < 3; c++) {
             const ssdgs_real *to = own + c * SSDGS__BLOCK + s;
-            outs[(6 + c) * SSDGS__BLOCK + s] +=
-                light[c] * (to[0] + to[6 * SSDGS__BLOCK]) + shine[c] * to[3 * SSDGS__BLOCK];
+            outs[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK + s] +=
+                light[c] * (to[0] + to[SSDGS__OUT_SCATTERING * SSDGS__BLOCK]) +
+                shine[c] * to[SSDGS__OUT_SPECULAR * SSDGS__BLOCK];
         }
     }
 }
@@ -6255,7 +6264,8 @@ static int ssdgs__object_factors(const ssdgs_frame *frame, const ssdgs_placed *o
 static void ssdgs__edit_rows(const ssdgs_real *factors, int rows, ssdgs_real *outs) {
     for (int i = 0; i < rows * SSDGS__BLOCK; i++) {
         const int row = i / SSDGS__BLOCK, s = i % SSDGS__BLOCK;
-        outs[i] *= factors[row % 3 * SSDGS__BLOCK + s] * (row / 3 == 1 ? factors[3 * SSDGS__BLOCK + s] : 1);
+        outs[i] *= factors[row % 3 * SSDGS__BLOCK + s] *
+                   (row / 3 * 3 == SSDGS__OUT_SPECULAR ? factors[3 * SSDGS__BLOCK + s] : 1);
     }
 }
 
@@ -6312,9 +6322,9 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             if (!lighting->deferred) continue;
             ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
             to[1] = 1; /* or what blends with it would be darker */
-            to[2] = scratch[l->lobe + 10 * SSDGS__BLOCK + (size_t)s];
+            to[2] = scratch[l->lobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + (size_t)s];
         }
-        for (int s = 0; !lit && s < SSDGS__BLOCK; s++) outs[9 * SSDGS__BLOCK + s] += 1;
+        for (int s = 0; !lit && s < SSDGS__BLOCK; s++) outs[SSDGS__OUT_SHADOW * SSDGS__BLOCK + s] += 1;
         if (!lit) continue;
         k->reflect(lighting, gauss, part + l->rows);
         for (int s = 0; s < SSDGS__BLOCK; s++) {
@@ -6360,14 +6370,14 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             ssdgs__medium_rows(lighting, o->medium, gauss, part + l->rows, part + l->transport, outs);
         if (lighting->deferred) {
             if (edited) ssdgs__edit_rows(factors, 6, outs);
-            ssdgs__layer_store(frame, layer, at, live, outs + 3 * SSDGS__BLOCK);
+            ssdgs__layer_store(frame, layer, at, live, outs + SSDGS__OUT_SPECULAR * SSDGS__BLOCK);
             ssdgs__layer_store(frame, layer + 1, at, live, outs);
-            memset(outs, 0, 6 * SSDGS__BLOCK * sizeof *outs);
+            memset(outs, 0, SSDGS__OUT_SCATTERING * SSDGS__BLOCK * sizeof *outs);
             for (int s = 0; s < live; s++) {
                 ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
                 to[0] = shadow ? shadow[s] : 0;
                 to[1] = part[l->visibility + (size_t)s];
-                to[2] = scratch[l->lobe + 10 * SSDGS__BLOCK + (size_t)s];
+                to[2] = scratch[l->lobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + (size_t)s];
             }
         }
     }
@@ -6382,16 +6392,17 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int s = 0; s < live; s++) {
             ssdgs_real *to = ssdgs__layer(frame, 2) + 4 * at[s];
             to[0] = frame->views[0].depth[at[s]];
-            to[1] = scratch[l->lobe + 9 * SSDGS__BLOCK + (size_t)s];
+            to[1] = scratch[l->lobe + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK + (size_t)s];
             to[2] = 1;
         }
     }
     for (int s = 0; s < live; s++) {
         const size_t g = at[s];
         ssdgs_real *to = outs + s, *color = frame->color + 4 * g;
-        int black = !ssdgs__finite(to[9 * SSDGS__BLOCK]);
+        int black = !ssdgs__finite(to[SSDGS__OUT_SHADOW * SSDGS__BLOCK]);
         for (int c = 0; c < 3; c++) {
-            color[c] = to[c * SSDGS__BLOCK] + to[(3 + c) * SSDGS__BLOCK] + to[(6 + c) * SSDGS__BLOCK];
+            color[c] = to[c * SSDGS__BLOCK] + to[(SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK] +
+                       to[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
             for (int i = 0; i < frame->layer_count;
                  i++) { /* whose products with the lobes must be finite as well */
@@ -6412,11 +6423,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         if (o->turned) ssdgs__turn(o, 0, normal, normal);
         for (int c = 0; c < 3; c++) {
             frame->diffuse[4 * g + (size_t)c] = to[c * SSDGS__BLOCK];
-            frame->specular[4 * g + (size_t)c] = to[(3 + c) * SSDGS__BLOCK];
-            frame->scattering[4 * g + (size_t)c] = to[(6 + c) * SSDGS__BLOCK];
+            frame->specular[4 * g + (size_t)c] = to[(SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK];
+            frame->scattering[4 * g + (size_t)c] = to[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK];
             frame->normal[4 * g + (size_t)c] = ssdgs__finite(normal[c]) ? normal[c] : 0;
         }
-        frame->shadow[4 * g] = o->light_count ? to[9 * SSDGS__BLOCK] / (ssdgs_real)o->light_count : 1;
+        frame->shadow[4 * g] =
+            o->light_count ? to[SSDGS__OUT_SHADOW * SSDGS__BLOCK] / (ssdgs_real)o->light_count : 1;
         frame->shadow[4 * g + 1] = frame->views[0].depth[g];
         frame->shadow[4 * g + 2] = 0;
     }
@@ -6559,7 +6571,8 @@ static void ssdgs__ambient_backward(const ssdgs_frame *frame, ssdgs__lighting *l
     frame->context->k->colour(lamp, in, own);
     for (int i = 0; i < 3 * SSDGS__BLOCK; i++)
         lane_sums[i / SSDGS__BLOCK * 16 + i % 16] +=
-            dcolor[i] * (own[i] + own[3 * SSDGS__BLOCK + i] + own[6 * SSDGS__BLOCK + i]);
+            dcolor[i] * (own[i] + own[SSDGS__OUT_SPECULAR * SSDGS__BLOCK + i] +
+                         own[SSDGS__OUT_SCATTERING * SSDGS__BLOCK + i]);
     for (int c = 0; c < 3; c++) lamp->intensity[c] *= frame->options.ambient[0][c];
 }
 
@@ -6603,9 +6616,10 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
                                  dlobe + 3 * c * SSDGS__BLOCK);
         ssdgs_real rows[3 * SSDGS__BLOCK];
         ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
-        memcpy(dlobe + 9 * SSDGS__BLOCK, rows + SSDGS__BLOCK,
-               SSDGS__BLOCK * sizeof *rows);                                /* depth is the projection's */
-        memset(dlobe + 10 * SSDGS__BLOCK, 0, SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
+        memcpy(dlobe + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK, rows + SSDGS__BLOCK,
+               SSDGS__BLOCK * sizeof *rows); /* depth is the projection's */
+        memset(dlobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK, 0,
+               SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
     }
     ssdgs_real dresidual[3 * SSDGS__BLOCK];
     const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, frame->gaussians.scattering};
@@ -6633,7 +6647,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
             ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 2), at, live, dresidual);
             for (int s = 0; s < SSDGS__BLOCK; s++)
-                dlobe[10 * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
+                dlobe[SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
         const ssdgs__colour_gradient out = {dcolor,
                                             deferred ? ddiffuse : dcolor,
@@ -13877,10 +13891,10 @@ SSDGS__FN void F(lobe)(const R *gauss, R *rows) {
             V_STORE(rows + i * SSDGS__BLOCK + s,
                     V_FMA(V_MUL(sharp[0], r[a]), r[b], V_MUL(V_MUL(sharp[1], r[a + 1]), r[b + 1])));
         }
-        for (int i = 0; i < 3; i++) V_STORE(rows + (6 + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
-        V_STORE(rows + 9 * SSDGS__BLOCK + s,
+        for (int i = 0; i < 3; i++) V_STORE(rows + (SSDGS__LOBE_NORMAL + i) * SSDGS__BLOCK + s, r[3 * i + 2]);
+        V_STORE(rows + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK + s,
                 F(reflectance)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s)));
-        V_STORE(rows + 10 * SSDGS__BLOCK + s,
+        V_STORE(rows + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s,
                 F(sigmoid)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s)));
     }
 }
@@ -13894,7 +13908,8 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
         V q[4], r[9];
         const V inverse_q = F(rotation)(raw, q, r);
         V dr[9];
-        for (int i = 0; i < 3; i++) dr[3 * i + 2] = V_LOAD(drows + (6 + i) * SSDGS__BLOCK + s);
+        for (int i = 0; i < 3; i++)
+            dr[3 * i + 2] = V_LOAD(drows + (SSDGS__LOBE_NORMAL + i) * SSDGS__BLOCK + s);
         /* Q = sharp r r': d sharp = r' dQ r, dr = 2 sharp dQ r, off the diagonal dQ is halved */
         for (int j = 0; j < 2; j++) {
             const V log_sharp = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
@@ -13918,10 +13933,12 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
         for (int i = 0; i < 4; i++, out += SSDGS__BLOCK) V_STORE(out, V_ADD(V_LOAD(out), dq[i]));
         const V f0 = F(reflectance)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
         out = dgauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s;
-        V_STORE(out, V_FMA(V_FNMA(f0, f0, f0), V_LOAD(drows + 9 * SSDGS__BLOCK + s), V_LOAD(out)));
+        V_STORE(out, V_FMA(V_FNMA(f0, f0, f0), V_LOAD(drows + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK + s),
+                           V_LOAD(out)));
         const V soft = F(sigmoid)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
         out += SSDGS__BLOCK;
-        V_STORE(out, V_FMA(V_FNMA(soft, soft, soft), V_LOAD(drows + 10 * SSDGS__BLOCK + s), V_LOAD(out)));
+        V_STORE(out, V_FMA(V_FNMA(soft, soft, soft), V_LOAD(drows + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s),
+                           V_LOAD(out)));
     }
 }
 
@@ -13983,7 +14000,7 @@ SSDGS__FI V F(dipole_of)(const ssdgs__lighting *k, const R *network, int c, int 
                      k->virtual_depth, d);
 }
 
-/* Adds to out (SSDGS__OUTS, BLOCK): diffuse (3), specular (3), scattering (3), S. */
+/* Adds to out (SSDGS__OUTS, BLOCK). */
 SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R *out) {
     const R *gauss = in->gauss, *rows = in->geometry, *visibility = in->visibility, *shadow = in->shadow;
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
@@ -14003,17 +14020,19 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R
             if (k->specular) {
                 const V ks = F(softplus)(V_LOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s));
                 const V f = V_MUL(ks, V_LOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s));
-                V_STORE(o + (3 + c) * SSDGS__BLOCK, V_FMA(f, lit, V_LOAD(o + (3 + c) * SSDGS__BLOCK)));
+                V_STORE(o + (SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK,
+                        V_FMA(f, lit, V_LOAD(o + (SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK)));
             }
             if (k->scattering) {
                 const V kss = F(softplus)(V_LOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
                 if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, NULL);
-                V_STORE(o + (6 + c) * SSDGS__BLOCK,
+                V_STORE(o + (SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK,
                         V_FMA(V_MUL(kss, profile), k->shadow_on_scattering ? shaded : power,
-                              V_LOAD(o + (6 + c) * SSDGS__BLOCK)));
+                              V_LOAD(o + (SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK)));
             }
         }
-        V_STORE(o + 9 * SSDGS__BLOCK, V_ADD(factor, V_LOAD(o + 9 * SSDGS__BLOCK)));
+        V_STORE(o + SSDGS__OUT_SHADOW * SSDGS__BLOCK,
+                V_ADD(factor, V_LOAD(o + SSDGS__OUT_SHADOW * SSDGS__BLOCK)));
     }
 }
 
