@@ -166,6 +166,7 @@ CHANGES, for programs written for 0.2.4
   ssdgs_model_adopt(model, from) adopt_model(context, &model, ..) of examples/adopt.h: another model
   notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
+  a hook's view is `cached` 1    2; 1 says that WALK is to be done again
 
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run

@@ -757,6 +757,20 @@ static void test_versions(void) {
         for (int again = 0; again < 2; again++)
             CHECK(adopt_from(&bare, !again, back, cases[i].version) == SSDGS_OK && same(bare, back));
         CHECK(ADOPT(back, 0, model) == SSDGS_OK && same(bare, back));
+        ssdgs_model *stranger = NULL; /* one of whose Gaussians the original has not */
+        ssdgs_model_arrays(back).gaussians[SSDGS_MATERIAL * back->capacity] += 1;
+        CHECK(load(edited.data, edited.size, &stranger, NULL) == SSDGS_OK &&
+              adopt_from(&stranger, 1, back, cases[i].version) == SSDGS_OK);
+        for (int c = 0; c < SSDGS_CHANNELS && stranger; c++) {
+            const int changes = cases[i].heights && c >= SSDGS_SPECULAR && c < SSDGS_SCATTERING;
+            const ssdgs_real raw = model->gaussians[(size_t)c * model->capacity];
+            ssdgs_gaussian g;
+            CHECK(changes || stranger->gaussians[(size_t)c * stranger->capacity] == raw);
+            if (!changes || !CHECK(!ssdgs_model_get(stranger, 0, &g))) continue;
+            const double height = log1p(exp((double)raw));
+            CHECK(fabs((double)g.specular[c - SSDGS_SPECULAR] - height) < 1e-5 * height);
+        }
+        ssdgs_model_destroy(stranger);
         ssdgs_model_destroy(bare);
         ssdgs_model_destroy(back);
         back = NULL;
