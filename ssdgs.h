@@ -4006,6 +4006,11 @@ static int ssdgs__needs_light(const ssdgs_frame *frame) {
     return 0;
 }
 
+/* Whether walks are to leave maps for pixels and for who asks. */
+static int ssdgs__wants_maps(const ssdgs_frame *frame) {
+    return frame->maps || (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM));
+}
+
 static ssdgs__light_memory *ssdgs__light_memories(const ssdgs_frame *frame) {
     return (ssdgs__light_memory *)frame->memory->lights.memory;
 }
@@ -4643,10 +4648,9 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
         SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, frame->model->global_count);
     }
-    const int maps = frame->maps || (frame->layer_count && (frame->terms & SSDGS_SHADOW_TERM));
     const int wanted = !ssdgs__needs_light(frame)
                            ? 0
-                           : SSDGS__MADE_VISIBILITY | (maps ? SSDGS__MADE_MAP : 0) |
+                           : SSDGS__MADE_VISIBILITY | (ssdgs__wants_maps(frame) ? SSDGS__MADE_MAP : 0) |
                                  (cue ? SSDGS__MADE_CUE : 0) | (transport ? SSDGS__MADE_FLUX : 0);
     result = ssdgs__light_table(frame);
     if (!result) result = ssdgs__materials(frame);
@@ -5165,7 +5169,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             frame->light_instances += v->instances;
             SSDGS__RESERVE(m->sums, v->tile_sums, ssdgs_real, v->instances * 4 + 4);
             v->light_map = NULL;
-            if (!(ssdgs__light_memories(frame)[v->light].wanted & SSDGS__MADE_MAP)) continue;
+            if (!ssdgs__wants_maps(frame)) continue;
             const int all = v->tiles_x * v->tiles_y;
             uint32_t used = 0;
             SSDGS__RESERVE(own->map_tile, v->map_tile, uint32_t, all + 1);
@@ -9380,7 +9384,7 @@ static const ssdgs__number ssdgs__train_numbers[] = {
     SSDGS__O(opacity_reset_every, 0, 'i', 0, 2000000000, 3000, 3000),
     SSDGS__O(batch, 0, 'i', 1, SSDGS__MAX_BATCH, 1, 1),
     SSDGS__O(refine, 0, 'i', 0, SSDGS__REFINE_ALL, 0, 0),
-    SSDGS__O(background, 3, 'r', -FLT_MAX, FLT_MAX, 0, 0),
+    SSDGS__O(background, 3, 'r', -(double)FLT_MAX, (double)FLT_MAX, 0, 0),
     SSDGS__O(dssim, 0, 'r', 0, 1, 0.2, 0.2),
     SSDGS__O(normal_weight, 0, 'r', 0, 1000000, 0.05, 0),
     SSDGS__O(bounds_min, 3, 'r', -1e30, 1e30, -0.5, -0.5),
