@@ -785,7 +785,7 @@ static void test_ahead(void) {
     /* one that draws without maps makes them when they are asked for */
     s = ssdgs_settings_published();
     s.scattering.width = 16;
-    ssdgs_model *plain = cloud(&s, 0, 300, 0.5);
+    ssdgs_model *plain = cloud(&s, 0, 1500, 0.5);
     const ssdgs_object shaded = ssdgs_object_default(plain);
     ssdgs_scene *late = NULL;
     CHECK(!ssdgs_scene_create(context, &late));
@@ -793,6 +793,15 @@ static void test_ahead(void) {
         CHECK(!ssdgs_scene_render(late, &shaded, 1, &camera, lights, 2, NULL, &image, &shot[1].stats));
     CHECK(shot[1].stats.lights_cached == 2);
     CHECK(ssdgs_scene_shadow(late, 1, point, 1, &fraction) == SSDGS_ERR_ARGUMENT);
+    ssdgs_scene *early = NULL; /* one that is lit before any camera looks has the same light */
+    for (int i = 0; i < 2; i++) {
+        const ssdgs_image both = planes_of(shot + i);
+        CHECK(!ssdgs_scene_create(context, &early));
+        if (i) CHECK(!ssdgs_scene_light(early, &shaded, 1, lights, 2, NULL));
+        CHECK(!ssdgs_scene_render(early, &shaded, 1, &camera, lights, 2, NULL, &both, NULL));
+        ssdgs_scene_destroy(early);
+    }
+    CHECK(same(shot, shot + 1));
     CHECK(!ssdgs_scene_light(late, &shaded, 1, lights, 2, NULL));
     for (int c = 0; c < 3; c++) point[c] = -lights[1].position[c];
     CHECK(!ssdgs_scene_shadow(late, 1, point, 1, &fraction) && fraction < (ssdgs_real)0.5);
