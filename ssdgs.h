@@ -1825,13 +1825,13 @@ static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
     return result;
 }
 
-/* Ends a function whose caller asks what cannot be; the rest is the message. */
+/* Where `wrong` holds, returns ERR_ARGUMENT with this message. */
 #define SSDGS__REFUSE(wrong, ...) \
     do { \
         if (wrong) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, __VA_ARGS__); \
     } while (0)
 
-/* All of a public function that hands its work to another. */
+/* The body of a public function: while `call` is at work, other calls on the context are refused. */
 #define SSDGS__GUARD(object, context, function, call) \
     if (!(object)) return SSDGS_ERR_ARGUMENT; \
     const ssdgs_result entered_ = SSDGS__ENTER(context, function); \
@@ -2541,19 +2541,22 @@ static void ssdgs__number_put(int type, unsigned char *at, double value) {
     memcpy(at, from, ssdgs__number_size(type));
 }
 
+/* Where its value i lies, in bytes. */
+static size_t ssdgs__number_at(const ssdgs__number *n, int i) {
+    return n->at + (size_t)i * ssdgs__number_size(n->type);
+}
+
 static void ssdgs__numbers_preset(const ssdgs__number *list, int count, int preset, void *to) {
     for (const ssdgs__number *n = list; n < list + count; n++)
         for (int i = 0; !i || i < n->count; i++)
-            ssdgs__number_put(n->type, (unsigned char *)to + n->at + (size_t)i * ssdgs__number_size(n->type),
-                              n->preset[preset]);
+            ssdgs__number_put(n->type, (unsigned char *)to + ssdgs__number_at(n, i), n->preset[preset]);
 }
 
 /* Ranges are those of files, which hold floats. */
 static ssdgs_result ssdgs__number_check(ssdgs_context *context, const char *what, const ssdgs__number *n,
                                         const void *of, double low, double high) {
     for (int i = 0; !i || i < n->count; i++) {
-        const double value = ssdgs__number_get(n->type, (const unsigned char *)of + n->at +
-                                                            (size_t)i * ssdgs__number_size(n->type));
+        const double value = ssdgs__number_get(n->type, (const unsigned char *)of + ssdgs__number_at(n, i));
         const char index[4] = {'[', (char)('0' + i), ']', 0};
         const int within = n->type == 'r' ? (float)value >= (float)low && (float)value <= (float)high &&
                                                 ssdgs__finite((ssdgs_real)value)
@@ -2638,8 +2641,8 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
         if (n->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
         if (n->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
         if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
-        const ssdgs_result result =
-            ssdgs__number_check(context, "settings", n, s, idle ? -1e300 : low, idle ? 1e300 : n->high);
+        const double most = idle ? (double)FLT_MAX : n->high;
+        const ssdgs_result result = ssdgs__number_check(context, "settings", n, s, idle ? -most : low, most);
         if (result) return result;
     }
     SSDGS__REFUSE(s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9,
@@ -3168,11 +3171,13 @@ typedef struct ssdgs__view_memory {
 
 /* Of a light. */
 typedef struct ssdgs__light_memory {
-    uint64_t key, shadow_key,
-        transport_key;         /* what the maps, the shadow network's outputs, transport rest on */
-    int made, wanted;          /* SSDGS__MADE_*: there for the key, needed by the frame */
-    int kept, transport_ready; /* 1: all that is wanted was there */
-    int first, views;          /* its views among the frame's */
+    uint64_t key;           /* what its maps and rows depend on */
+    uint64_t shadow_key;    /* of the shadow network's outputs that are there */
+    uint64_t transport_key; /* of the transport that is there */
+    int made, wanted;       /* SSDGS__MADE_*: what is there for the key, what this frame needs */
+    int kept;               /* 1: an earlier frame has made all that is wanted */
+    int transport_ready;    /* 1: its nodes need not be built */
+    int first, views;       /* its views among the frame's */
 } ssdgs__light_memory;
 
 enum { SSDGS__MADE_VISIBILITY = 1, SSDGS__MADE_MAP = 2, SSDGS__MADE_CUE = 4, SSDGS__MADE_FLUX = 8 };
@@ -3184,8 +3189,8 @@ typedef struct ssdgs__frame_memory {
     int ready;                         /* 1: what the keys stand for is there */
     uint64_t camera_key, walk_key;     /* of the camera's view up to BIN, and up to WALK */
     uint64_t bounds_key;               /* of `scene` */
-    int mapped;                        /* lights whose maps were asked for and are there */
-    ssdgs_real bias;                   /* for who asks them */
+    int mapped;                        /* lights that ssdgs_scene_shadow() may ask */
+    ssdgs_real bias;                   /* the frame's, of pixels */
     uint64_t counts[3 * SSDGS__SLOTS]; /* of the last shading, for the statistics */
     ssdgs__bounds scene;
 } ssdgs__frame_memory;
@@ -3819,8 +3824,8 @@ static ssdgs__bounds ssdgs__light_bounds(const ssdgs_frame *frame, int index) {
 
 /* The views that cover, from a light, what is in its reach: one frustum from outside, or along a spot's cone
    where that is narrower; an orthographic one from very far, six faces of a cube from close by or inside.
-   Returns how many; with views NULL only that. */
-static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_view *views) {
+   Returns how many. */
+static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_view views[6]) {
     const ssdgs_settings *settings = &frame->settings;
     const ssdgs__bounds bounds = ssdgs__light_bounds(frame, index), *b = &bounds;
     const ssdgs_light *light = frame->lights + index;
@@ -3846,7 +3851,6 @@ static int ssdgs__light_views(const ssdgs_frame *frame, int index, ssdgs_splat_v
     const int outside = distance > 1.3 * radius;
     const int along = cone < (outside ? radius / sqrt(distance * distance - radius2) : 1e29);
     const int faces = outside || along ? 1 : 6;
-    if (!views) return faces;
     if (along) distance = distance > radius ? distance : radius; /* of what it lights, about */
     int map = settings->light_map.size;
     if (!map) {
@@ -4248,7 +4252,8 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         else if (ssdgs__has_medium(&o.settings, o.settings.terms))
             ssdgs__medium_weights(&o.settings, o.translucency, o.medium);
         o.first = (int)at;
-        o.key = ssdgs__fold(SSDGS__FOLD_START, &o.revision, sizeof o.revision);
+        o.key = SSDGS__FOLD_START;
+        SSDGS__FOLD(o.key, o.revision);
         SSDGS__FOLD(o.key, o.first);
         SSDGS__FOLD(o.key, o.rotation);
         SSDGS__FOLD(o.key, o.scale);
@@ -4443,7 +4448,8 @@ static ssdgs_result ssdgs__expose(ssdgs_placed *o);
 
 /* Of what is drawn and where it stands: all objects, or those that `reach` has. */
 static uint64_t ssdgs__objects_key(const ssdgs_frame *frame, const unsigned char *reach) {
-    uint64_t key = ssdgs__fold(SSDGS__FOLD_START, &frame->count, sizeof frame->count); /* rows are as long */
+    uint64_t key = SSDGS__FOLD_START;
+    SSDGS__FOLD(key, frame->count); /* rows are as long */
     SSDGS__FOLD(key, frame->options.alpha_threshold);
     for (int i = 0; i < frame->object_count; i++)
         if (!reach || reach[i]) SSDGS__FOLD(key, frame->objects[i].key);
@@ -4476,7 +4482,8 @@ static void ssdgs__begin_camera(ssdgs_frame *frame) {
     v.variance = frame->settings.pixel_variance;
     memcpy(v.view, camera->view, sizeof v.view);
     const uint64_t key = ssdgs__views_key(frame, -1, &v, 1);
-    uint64_t walk = ssdgs__fold(key, &frame->options.stop, sizeof frame->options.stop);
+    uint64_t walk = key;
+    SSDGS__FOLD(walk, frame->options.stop);
     SSDGS__FOLD(walk, frame->options.max_error);
     if (frame->scene_depth) walk = 0; /* what it hides may change behind the pointer */
     if (key != m->camera_key) *frame->views = v;
@@ -4485,14 +4492,30 @@ static void ssdgs__begin_camera(ssdgs_frame *frame) {
     m->walk_key = walk;
 }
 
-/* A dark light's views are not made, but what is there of them stays. */
-static void ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted) {
+/* Room for so many views; what is there of them stays. */
+static ssdgs_result ssdgs__views_reserve(ssdgs_frame *frame, int count) {
+    ssdgs_context *context = frame->context;
+    ssdgs__frame_memory *m = frame->memory;
+    const ssdgs_result result =
+        ssdgs__grow(context, &m->view_memory, (size_t)count, sizeof(ssdgs__view_memory));
+    if (result) return result;
+    SSDGS__KEEP(m->views, frame->views, ssdgs_splat_view, count);
+    frame->view_count = frame->batch[1] = count;
+    return SSDGS_OK;
+}
+
+/* Appends a light's views. A dark light's are not made, but what is there of them stays. */
+static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted) {
     const ssdgs_light *light = frame->lights + index;
     ssdgs__light_memory *own = ssdgs__light_memories(frame) + index;
     ssdgs_splat_view views[6];
     ssdgs_real place[3];
+    own->first = frame->view_count;
+    own->views = ssdgs__light_views(frame, index, views);
+    const ssdgs_result result = ssdgs__views_reserve(frame, own->first + own->views);
+    if (result) return result;
     ssdgs__light_place(light, place);
-    uint64_t key = ssdgs__views_key(frame, index, views, ssdgs__light_views(frame, index, views));
+    uint64_t key = ssdgs__views_key(frame, index, views, own->views);
     SSDGS__FOLD(key, light->kind);
     SSDGS__FOLD(key, place);
     SSDGS__FOLD(key, own->first);
@@ -4512,38 +4535,30 @@ static void ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted) {
         if (!own->kept) *v = views[i];
         v->cached = own->kept || !own->wanted ? 2 : 0;
     }
+    return SSDGS_OK;
 }
 
-/* Lays out the views, and finds what is there of them. looks: 0: no camera does. */
+/* Lays out the views, and finds what is there of them. wanted: SSDGS__MADE_* of the lights; looks: 0: no
+   camera does. */
 static ssdgs_result ssdgs__begin_views(ssdgs_frame *frame, int wanted, int looks) {
     ssdgs_context *context = frame->context;
     ssdgs__frame_memory *m = frame->memory;
     ssdgs__light_memory *lights;
     const int light_count = wanted ? frame->light_count : 0;
     SSDGS__KEEP(m->lights, lights, ssdgs__light_memory, frame->light_count + 1);
-    frame->view_count = 1;
-    if (light_count) {
-        const uint64_t key = ssdgs__objects_key(frame, NULL);
-        const ssdgs_result result = key != m->bounds_key ? ssdgs__scene_bounds(frame, &m->scene) : SSDGS_OK;
-        if (result) return result;
-        m->bounds_key = key;
-        memset(lights + light_count, 0, m->lights.bytes - (size_t)light_count * sizeof *lights);
-    }
-    for (int i = 0; i < light_count; i++) {
-        lights[i].first = frame->view_count;
-        lights[i].views = ssdgs__light_views(frame, i, NULL);
-        frame->view_count += lights[i].views;
-    }
-    const ssdgs_result result =
-        ssdgs__grow(context, &m->view_memory, (size_t)frame->view_count, sizeof(ssdgs__view_memory));
+    ssdgs_result result = ssdgs__views_reserve(frame, 1);
     if (result) return result;
-    SSDGS__KEEP(m->views, frame->views, ssdgs_splat_view, frame->view_count);
-    frame->batch[1] = frame->view_count;
     frame->views->light = -1;
     frame->views->cached = 2;
     if (looks) ssdgs__begin_camera(frame);
-    for (int i = 0; i < light_count; i++) ssdgs__begin_light(frame, i, wanted);
-    return SSDGS_OK;
+    if (!light_count) return SSDGS_OK;
+    const uint64_t key = ssdgs__objects_key(frame, NULL);
+    if (key != m->bounds_key) result = ssdgs__scene_bounds(frame, &m->scene);
+    m->bounds_key = key;
+    /* those behind may lose their views to others */
+    memset(lights + light_count, 0, m->lights.bytes - (size_t)light_count * sizeof *lights);
+    for (int i = 0; i < light_count && !result; i++) result = ssdgs__begin_light(frame, i, wanted);
+    return result;
 }
 
 /* Forgets what earlier frames have found. */
@@ -5626,19 +5641,22 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     SSDGS__RESERVE(frame->memory->transport, job.sums, ssdgs_real,
                    blocks * SSDGS__LENGTHS * SSDGS__BLOCK + 1);
     SSDGS__RESERVE(frame->memory->transport_known, job.known, unsigned char, blocks + 1);
-    uint64_t objects = ssdgs__fold(SSDGS__FOLD_START, &frame->options.transport_detail, sizeof(ssdgs_real));
-    SSDGS__FOLD(objects, frame->light_count); /* the nodes' places */
+    uint64_t common = SSDGS__FOLD_START; /* to the keys of all lights */
+    SSDGS__FOLD(common, frame->options.transport_detail);
+    SSDGS__FOLD(common, frame->light_count); /* the nodes' places */
     for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
         const int has = ssdgs__has_transport(o);
-        SSDGS__FOLD(objects, has);
-        SSDGS__FOLD(objects, o->translucency);
+        SSDGS__FOLD(common, has);
+        SSDGS__FOLD(common, o->translucency);
     }
     for (int i = 0; i < frame->light_count; i++) {
-        const uint64_t key = ssdgs__fold(lights[i].key, &objects, sizeof objects);
-        const int casts = ssdgs__casts(frame->lights + i), known = key == lights[i].transport_key;
-        if (!known) memset(job.known + (size_t)i * (size_t)job.blocks, 0, (size_t)job.blocks);
-        if (!known) lights[i].transport_key = casts ? key : 0;
-        lights[i].transport_ready = known || !casts;
+        const int casts = ssdgs__casts(frame->lights + i);
+        uint64_t key = lights[i].key;
+        SSDGS__FOLD(key, common);
+        lights[i].transport_ready = key == lights[i].transport_key || !casts;
+        if (key == lights[i].transport_key) continue;
+        memset(job.known + (size_t)i * (size_t)job.blocks, 0, (size_t)job.blocks);
+        lights[i].transport_key = casts ? key : 0;
     }
     const ssdgs_result result = ssdgs__nodes(frame, &job.tree);
     if (result) return result;
@@ -6895,13 +6913,12 @@ static ssdgs_real ssdgs__map_transmittance(const ssdgs_splat_view *map, const ss
     return (1 - w) * row[0] + w * row[1];
 }
 
-/* Transmittance from a light to a place in the world, by its maps from its first view on; -1 where none knows
-   it. slope as above. */
-static ssdgs_real ssdgs__light_transmittance(const ssdgs_frame *frame, int light, int first,
-                                             const ssdgs_real at[3], ssdgs_real *slope) {
+/* Transmittance from a light to a place in the world, by its maps; -1 where none knows it. slope as above. */
+static ssdgs_real ssdgs__light_transmittance(const ssdgs_frame *frame, int light, const ssdgs_real at[3],
+                                             ssdgs_real *slope) {
     ssdgs_real passed = -1;
-    for (int view = first; view < frame->view_count && frame->views[view].light == light && passed < 0;
-         view++)
+    const ssdgs__light_memory *own = ssdgs__light_memories(frame) + light;
+    for (int view = own->first; view < own->first + own->views && passed < 0; view++)
         if (frame->views[view].light_map)
             passed = ssdgs__map_transmittance(frame->views + view, at, frame->bias[1], slope);
     return passed;
@@ -6929,7 +6946,6 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
-    const int first = ssdgs__light_memories(frame)[light].first;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i);
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
@@ -6937,7 +6953,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         visibility[lane] = 1;
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
         ssdgs__place_of_pixel(k, tile, i, depth[0] / depth[32], ray, at);
-        const ssdgs_real passed = ssdgs__light_transmittance(frame, light, first, at, NULL);
+        const ssdgs_real passed = ssdgs__light_transmittance(frame, light, at, NULL);
         visibility[lane] = passed < 0
                                ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
                                : passed;
@@ -7121,7 +7137,6 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
                                   const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
                                   ssdgs_real *sums) {
     const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
-    const int first = ssdgs__light_memories(frame)[light].first;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i), layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         const ssdgs_real cover = pixels[layer + 32];
@@ -7129,7 +7144,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
         if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
         const ssdgs_real z = pixels[layer] / cover;
         ssdgs__place_of_pixel(k, tile, i, z, ray, at);
-        if (ssdgs__light_transmittance(frame, light, first, at, slope) < 0) { /* it is the Gaussians' */
+        if (ssdgs__light_transmittance(frame, light, at, slope) < 0) { /* it is the Gaussians' */
             const int own = (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16;
             gradient[own] += dv[lane] / cover;
             gradient[layer + 32] -= dv[lane] * pixels[own] / (cover * cover);
@@ -11595,11 +11610,10 @@ static ssdgs_result ssdgs__checkpoint_numbers(ssdgs_context *context, const char
                                               const void *here) {
     for (const ssdgs__number *n = list; n < list + count; n++)
         for (int i = 0; !i || i < n->count; i++) {
-            const size_t size = ssdgs__number_size(n->type), at = n->at + (size_t)i * size;
-            const unsigned char *was = (const unsigned char *)there + at,
-                                *is = (const unsigned char *)here + at;
+            const unsigned char *was = (const unsigned char *)there + ssdgs__number_at(n, i),
+                                *is = (const unsigned char *)here + ssdgs__number_at(n, i);
             const char index[4] = {'[', (char)('0' + i), ']', 0};
-            if (memcmp(was, is, size))
+            if (memcmp(was, is, ssdgs__number_size(n->type)))
                 return ssdgs__fail(context, SSDGS_ERR_FORMAT,
                                    "%s: %s%s was %g in its run and is %g now" SSDGS__ANOTHER, path, n->name,
                                    n->count ? index : "", ssdgs__number_get(n->type, was),

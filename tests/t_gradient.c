@@ -752,7 +752,7 @@ static double stray_loss(ssdgs_model *model, ssdgs_frame *frame, int *without) {
         const double alpha = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 2)[i],
                      z = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0)[i] / alpha,
                      at[3] = {(i % STRAY_SIDE + 0.5 - 12) / 60 * z, (i / STRAY_SIDE + 0.5 - 12) / 60 * z, z};
-        *without += alpha > 1e-3 && ssdgs__light_transmittance(frame, 0, 1, at, NULL) < 0;
+        *without += alpha > 1e-3 && ssdgs__light_transmittance(frame, 0, at, NULL) < 0;
     }
     return sum;
 }
