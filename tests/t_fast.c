@@ -12,9 +12,11 @@ static double draw(uint64_t counter) { return ssdgs__uniform(77, counter); }
 
 /* A shell of flat Gaussians, dense enough to hide most of itself, with networks that have something to
    say. */
-static ssdgs_model *make_model(ssdgs_context *context, int count) {
+static ssdgs_model *model_of(ssdgs_context *context, int count, int depth_cue, int transport) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
+    settings.depth_cue = depth_cue;
+    settings.transport = transport;
     settings.pixel_variance = (ssdgs_real)0.3; /* broad, so that weights are often small */
     if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
     ssdgs_model_view v = ssdgs_model_arrays(model);
@@ -37,6 +39,8 @@ static ssdgs_model *make_model(ssdgs_context *context, int count) {
     for (size_t i = 0; i < v.shadow_count; i++) v.shadow[i] += (ssdgs_real)(0.2 * draw(1000000 + i) - 0.1);
     return model;
 }
+
+static ssdgs_model *make_model(ssdgs_context *context, int count) { return model_of(context, count, 0, 1); }
 
 static ssdgs_camera camera_at(double angle) {
     const ssdgs_real eye[3] = {(ssdgs_real)(2 * cos(angle)), (ssdgs_real)(2 * sin(angle)), (ssdgs_real)0.7};
@@ -119,6 +123,12 @@ static void test_kept(void) {
     options.max_error = 0;
     check_same(model, &a, lights, 2, &options, 1, 2, "another max_error"); /* it is walked again */
     FIRST();
+    options.stop = (ssdgs_real)0.1;
+    check_same(model, &a, lights, 2, &options, 1, 0, "another stop");
+    FIRST();
+    options.antialias = 1;
+    check_same(model, &a, lights, 2, &options, 0, 2, "antialias");
+    FIRST();
     options.light_detail = (ssdgs_real)0.5;
     check_same(model, &a, lights, 2, &options, 1, 0, "another light_detail");
     FIRST();
@@ -130,16 +140,18 @@ static void test_kept(void) {
     FIRST();
     options.alpha_threshold = (ssdgs_real)0.1;
     check_same(model, &a, lights, 2, &options, 0, 0, "one that the topmost is below");
-    (void)ssdgs_model_arrays(model);
-    options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-    FIRST();
-    options.terms = SSDGS_ALL_TERMS;
-    check_same(model, &a, lights, 2, &options, 1, 0, "the depth cue is wanted now");
-    FIRST();
-    options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
-    FIRST();
-    options.terms = SSDGS_ALL_TERMS;
-    check_same(model, &a, lights, 2, &options, 1, 2, "the depth cue is there from before");
+    for (int cue = 0; cue < 2; cue++) { /* the depth cue, or the flux, is wanted, and was not or was */
+        ssdgs_model *sees = model_of(context, FEWER, cue, !cue);
+        for (int before = 0; before < 2; before++) {
+            if (!before) (void)ssdgs_model_arrays(sees);
+            options.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+            render(sees, &a, lights, 2, &options, image[0], NULL);
+            options.terms = SSDGS_ALL_TERMS;
+            check_same(sees, &a, lights, 2, &options, 1, before ? 2 : 0, "what scatters is wanted");
+            render(sees, &a, lights, 2, &options, image[0], NULL);
+        }
+        ssdgs_model_destroy(sees);
+    }
     FIRST();
     options.terms = SSDGS_DIFFUSE_TERM;
     check_same(model, &a, lights, 2, &options, 1, 0, "no shadow");

@@ -583,7 +583,7 @@ static void test_dark(void) {
     CHECK(worst < 1e-6);
     CHECK(shot[1].stats.light_views == shot[0].stats.light_views && work > 0 &&
           shot[1].stats.network_work >= work && shot[1].stats.network_work <= work);
-    CHECK(shot[1].stats.objects == 1);
+    CHECK(shot[1].stats.objects == 1 && shot[1].stats.light_instances == shot[0].stats.light_instances);
     static ssdgs_real color[2][3 * PIXELS]; /* and without a plane of each term */
     const ssdgs_object twice[2] = {ssdgs_object_default(model), placed(model, 0.7, 0.5, 1, 0.9, -0.2, 0.1)};
     for (int count = 1; count < 3; count++) {
@@ -676,6 +676,10 @@ static void half_of(void *user, int light, const ssdgs_real *points, int count, 
     asked += count;
 }
 
+static void half_again(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    half_of(user, light, points, count, fraction);
+}
+
 /* An occluder equals a plate that does what it does; one that takes half leaves half. */
 static void test_occluder(void) {
     const ssdgs_camera camera = camera_from(0, -2.2, 0.3);
@@ -745,9 +749,12 @@ static void test_occluder(void) {
     for (int i = 0; i < 3 * PIXELS; i++) shot[0].value[3 * PIXELS + i] *= (ssdgs_real)1.5;
     CHECK_L2(shot[1].value + 3 * PIXELS, shot[0].value + 3 * PIXELS, 3 * PIXELS, 1e-5,
              "half of one of two lights");
-    for (int change = 0; change < 3; change++) { /* what is kept stays until the answers change */
+    int same_second = 1;
+    for (int change = 0; change < 5; change++) { /* what is kept stays until the answers may change */
         const int pixels_alone = asked = 0;
         if (change == 2) half.revision++;
+        if (change == 3) half.user = &same_second;
+        if (change == 4) half.shadow = half_again;
         ssdgs_scene_occlude(scene, change ? &half : NULL);
         together(object, 1, &camera, twice, 2, NULL, shot + 2);
         CHECK(shot[2].stats.lights_cached == 0 && (change > 0) == (asked > pixels_alone));
@@ -1474,6 +1481,17 @@ static void test_kept(void) {
     object[0].model = larger;
     together(object, 2, &camera, lights, 2, &options, shot + 1);
     CHECK(same(shot, shot + 1));
+    s.transport = 0;
+    ssdgs_model *dense =
+        cloud(&s, 300, 300, 0.3); /* out of reach, but the trees of transport stand in one row */
+    for (int way = 0; way < 2; way++) {
+        object[0].model = way ? dense : larger;
+        together(object, 2, &camera, lights, 2, &options, shot);
+    }
+    (void)ssdgs_model_arrays(model[0]);
+    together(object, 2, &camera, lights, 2, &options, shot + 1);
+    CHECK(shot->stats.lights_cached == 2 && same(shot, shot + 1));
+    ssdgs_model_destroy(dense);
     for (int way = 0; way < 3; way++) { /* one that grows where it is, beside a larger one */
         ssdgs_camera near_by = camera;
         ssdgs_object two[2] = {placed(model[1], 0, way ? 0.6 : 0.5, 0, 0, 0, 0),
