@@ -988,10 +988,10 @@ typedef struct ssdgs_placed {
     uint64_t key;             /* of revision, first, rotation, scale and offset: equal where these are */
     double middle[3], radius; /* world: a ball around what it draws; no use with one object alone */
     ssdgs_real tint[3], roughness, specular, translucency;
-    ssdgs_real medium[15];      /* RGB weights of true transport's lengths, where a medium scatters */
-    const unsigned char *mask;  /* as in ssdgs_object */
-    int material;               /* pixels blend and light the layers of each material by themselves */
-    const ssdgs_real *exposure; /* what of ambient light comes to each Gaussian; NULL: there is none */
+    ssdgs_real medium[15];       /* RGB weights of true transport's lengths, where a medium scatters */
+    const unsigned char *mask;   /* as in ssdgs_object */
+    int material;                /* pixels blend and light the layers of each material by themselves */
+    const ssdgs_real *sky_share; /* what of ambient light comes to each Gaussian; NULL: there is none */
 } ssdgs_placed;
 
 typedef struct ssdgs_frame {
@@ -2392,10 +2392,10 @@ struct ssdgs_model {
     double low[3], high[3];            /* the box that holds all that its Gaussians draw */
     ssdgs__bounds bounds;              /* of them to three standard deviations, but for a few strays */
     uint64_t box_revision;             /* of which revision both are */
-    ssdgs_real *exposure; /* (2 x exposure_room) the share of an even sky that each Gaussian gets; as many are
-                             scratch */
-    uint64_t exposure_revision; /* for which of its revisions */
-    size_t exposure_room;
+    ssdgs_real *sky_share; /* (2 x sky_share_room) the share of an even sky that each Gaussian gets; as many
+                             are scratch */
+    uint64_t sky_share_revision; /* for which of its revisions */
+    size_t sky_share_room;
 };
 
 /* Parameters that learn together: planes of every Gaussian, then what all share */
@@ -2707,7 +2707,7 @@ static void ssdgs__model_drop(ssdgs_model *model) {
     ssdgs__release(context, model->gaussians);
     ssdgs__release(context, model->globals);
     ssdgs__frame_memory_destroy(context, model->frame);
-    ssdgs__release(context, model->exposure);
+    ssdgs__release(context, model->sky_share);
     ssdgs__release(context, model);
     ssdgs__context_drop(context);
 }
@@ -3260,7 +3260,7 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
     model->context = to;
     model->revision = ++to->revisions;
     model->box_revision = 0; /* they counted in `from` */
-    model->exposure_revision = 0;
+    model->sky_share_revision = 0;
     to->references++;
     return SSDGS_OK;
 }
@@ -4442,7 +4442,7 @@ static int ssdgs__has_ambient(const ssdgs_render_options *options) {
     return any;
 }
 
-static ssdgs_result ssdgs__expose(ssdgs_placed *o);
+static ssdgs_result ssdgs__sky_shares_of(ssdgs_placed *o);
 
 /* ---- what earlier frames have found has a key of all that it depends on; equal keys, equal results ---- */
 
@@ -4612,7 +4612,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     m->ready = m->mapped = 0; /* again once the walks are done */
     result = ssdgs__place_all(frame, request->objects, request->object_count, light_count);
     for (int i = 0; !result && ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
-        result = ssdgs__expose(frame->objects + i);
+        result = ssdgs__sky_shares_of(frame->objects + i);
     if (!result) result = ssdgs__find_reach(frame);
     if (result) return result;
     const size_t n = (size_t)frame->count + SSDGS__BLOCK;
@@ -5708,7 +5708,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame, const ssdgs_p
     l.scattering_at = l.shadow_at + b * ssdgs__output_rows(l.shadow, l.shadow_layers);
     l.light_size = l.scattering_at + b * ssdgs__output_rows(l.scattering, l.scattering_layers);
     l.lights = b * SSDGS_CHANNELS;
-    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count + (o->exposure != NULL)
+    l.size = l.lights + l.light_size * (size_t)(frame->training ? frame->light_count + (o->sky_share != NULL)
                                                                 : 1); /* only the backward asks again */
     l.outs = b * (size_t)(l.widest + 1);
     l.lobe = l.outs + b * SSDGS__OUTS;
@@ -6221,7 +6221,7 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
     memset(own, 0, sizeof own);
     ssdgs__ambient_rows(lighting, k, gauss, gloss_factor, rows, mirrored);
     for (size_t s = 0; s < SSDGS__BLOCK; s++) {
-        rows[SSDGS__IRRADIANCE * SSDGS__BLOCK + s] = o->exposure[at[s] - (size_t)o->first];
+        rows[SSDGS__IRRADIANCE * SSDGS__BLOCK + s] = o->sky_share[at[s] - (size_t)o->first];
         part[l->visibility + s] = 1;
         part[l->cue + s] = 0;
     }
@@ -6404,7 +6404,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             }
         }
     }
-    if (o->exposure)
+    if (o->sky_share)
         ssdgs__shade_ambient(frame, o, l, lists, at, edited ? factors + 3 * SSDGS__BLOCK : NULL, memory,
                              scratch);
     if (settings->baked) ssdgs__baked(frame, o, gauss, outs);
@@ -6581,7 +6581,7 @@ static void ssdgs__gradient_rows(const ssdgs_real *from, const size_t at[SSDGS__
 
 /* The lights that a training frame's Gaussians learn from: ambient light is one more. */
 static int ssdgs__learning_lights(const ssdgs_frame *frame) {
-    return frame->light_count + (frame->objects->exposure != NULL);
+    return frame->light_count + (frame->objects->sky_share != NULL);
 }
 
 /* Adds dL/d(ambient light's intensity) to the lane sums that hold a lamp's dL/d(position), then gives lamp
@@ -7735,10 +7735,10 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
 
 /* ---- light from all around ---- */
 
-/* Adds to exposures those of one direction, and its weights to `sums`. */
-static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory **memory,
-                                       const ssdgs_real direction[3], ssdgs_real *exposure,
-                                       ssdgs_real *sums) {
+/* Adds to the shares those of one direction, and its weights to `sums`. */
+static ssdgs_result ssdgs__sky_shares_from(ssdgs_model *model, ssdgs__frame_memory **memory,
+                                           const ssdgs_real direction[3], ssdgs_real *sky_share,
+                                           ssdgs_real *sums) {
     const ssdgs_object object = ssdgs__object_alone(model);
     const ssdgs_render_options options = ssdgs_render_options_preview();
     static const ssdgs_real even[3] = {1, 1, 1};
@@ -7756,50 +7756,50 @@ static ssdgs_result ssdgs__expose_from(ssdgs_model *model, ssdgs__frame_memory *
         ssdgs__rotation_scalar(raw, q, r);
         const ssdgs_real facing = r[2] * direction[0] + r[5] * direction[1] + r[8] * direction[2];
         if (!(facing > 0)) continue;
-        exposure[i] += facing * frame.visibility[i];
+        sky_share[i] += facing * frame.visibility[i];
         sums[i] += facing;
     }
     return result;
 }
 
-/* exposure (2 x room): the share of an even sky that reaches each Gaussian, by light walks from an
+/* sky_share (2 x room): the share of an even sky that reaches each Gaussian, by light walks from an
    icosahedron's corners. The second half is scratch. */
-static ssdgs_result ssdgs__expose_model(ssdgs_model *model, size_t room, ssdgs_real *exposure) {
+static ssdgs_result ssdgs__sky_shares(ssdgs_model *model, size_t room, ssdgs_real *sky_share) {
     static const ssdgs_real a = (ssdgs_real)0.5257311121191336, b = (ssdgs_real)0.85065080835204;
     ssdgs__frame_memory *memory = NULL;
     ssdgs_result result = SSDGS_OK;
-    ssdgs_real *sums = exposure + room;
-    memset(exposure, 0, 2 * room * sizeof *sums);
+    ssdgs_real *sums = sky_share + room;
+    memset(sky_share, 0, 2 * room * sizeof *sums);
     for (int i = 0; i < 12 && !result; i++) {
         ssdgs_real direction[3];
         direction[i / 4] = 0;
         direction[(i / 4 + 1) % 3] = i & 1 ? -a : a;
         direction[(i / 4 + 2) % 3] = i & 2 ? -b : b;
-        result = ssdgs__expose_from(model, &memory, direction, exposure, sums);
+        result = ssdgs__sky_shares_from(model, &memory, direction, sky_share, sums);
     }
     ssdgs__frame_memory_destroy(model->context, memory);
-    for (int i = 0; i < model->count && !result; i++) exposure[i] = sums[i] > 0 ? exposure[i] / sums[i] : 1;
+    for (int i = 0; i < model->count && !result; i++) sky_share[i] = sums[i] > 0 ? sky_share[i] / sums[i] : 1;
     return result;
 }
 
-/* Finds the exposures of an object's Gaussians, unless they are known. */
-static ssdgs_result ssdgs__expose(ssdgs_placed *o) {
+/* Finds the share of an even sky of each of an object's Gaussians, unless they are known. */
+static ssdgs_result ssdgs__sky_shares_of(ssdgs_placed *o) {
     ssdgs_model *model = o->model;
     ssdgs_context *context = model->context;
     if (o->settings.baked) return SSDGS_OK;
-    if (model->exposure_room < model->capacity) {
-        ssdgs__release(context, model->exposure);
-        model->exposure_room = 0;
-        model->exposure =
-            (ssdgs_real *)ssdgs__allocate(context, 2 * model->capacity * sizeof *model->exposure);
-        if (!model->exposure) return SSDGS_ERR_MEMORY;
-        model->exposure_room = model->capacity;
-        model->exposure_revision = 0;
+    if (model->sky_share_room < model->capacity) {
+        ssdgs__release(context, model->sky_share);
+        model->sky_share_room = 0;
+        model->sky_share =
+            (ssdgs_real *)ssdgs__allocate(context, 2 * model->capacity * sizeof *model->sky_share);
+        if (!model->sky_share) return SSDGS_ERR_MEMORY;
+        model->sky_share_room = model->capacity;
+        model->sky_share_revision = 0;
     }
-    o->exposure = model->exposure;
-    if (model->exposure_revision == model->revision) return SSDGS_OK;
-    const ssdgs_result result = ssdgs__expose_model(model, model->exposure_room, model->exposure);
-    if (!result) model->exposure_revision = model->revision;
+    o->sky_share = model->sky_share;
+    if (model->sky_share_revision == model->revision) return SSDGS_OK;
+    const ssdgs_result result = ssdgs__sky_shares(model, model->sky_share_room, model->sky_share);
+    if (!result) model->sky_share_revision = model->revision;
     return result;
 }
 
@@ -9337,6 +9337,17 @@ typedef struct ssdgs__correction {
     int steps[2]; /* Adam's clocks of the camera, of the light */
 } ssdgs__correction;
 
+/* How far a run is: with the arrays, what a checkpoint keeps. */
+typedef struct ssdgs__run {
+    double start_size;        /* of random points, 0 without */
+    double ambient[6];        /* Adam's moments of settings.ambient: means, then squares */
+    int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
+    int ambient_steps;        /* its clock of settings.ambient */
+    int iteration, skipped;
+    int sky_ready; /* 1: sky_share is up to date */
+    int outlines;  /* 1: photographs show where the object ends */
+} ssdgs__run;
+
 struct ssdgs_trainer {
     ssdgs_context *context;
     ssdgs_model *model;
@@ -9357,20 +9368,14 @@ struct ssdgs_trainer {
     ssdgs_real *screen_gradient; /* (n) each, sums since the last density control: pull, views, weights */
     ssdgs_real *screen_count;
     ssdgs_real *contribution;
-    ssdgs_real *exposure; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
-    int exposed;          /* 1: it is up to date */
-    double ambient[6];    /* Adam's moments of settings.ambient: means, then squares */
-    int ambient_steps;    /* and its clock */
-    double extent;        /* 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
-    int budget;           /* density control makes no more Gaussians */
-    int outlines;         /* photographs show where the object ends */
+    ssdgs_real *sky_share; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
+    double extent;         /* 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
+    int budget;            /* density control makes no more Gaussians */
     int backdrop,
-        opaque_everywhere; /* they do not, but show options.background around it; or surfaces, everywhere */
+        opaque_everywhere; /* no outlines, but options.background around it; or surfaces, everywhere */
     int one_light;         /* photographs do not tell how the object looks in other light */
     double unit;           /* the bounds' longest side */
-    double start_size;     /* of random points, 0 without */
-    int steps[SSDGS__GROUPS]; /* Adam's clocks: a frozen group's stands still */
-    int iteration, skipped;
+    ssdgs__run run;
     int running;        /* in ssdgs_trainer_run() */
     ssdgs__buffer sums; /* of a batch */
 };
@@ -9770,7 +9775,7 @@ typedef struct ssdgs__photo_job {
     int frozen[2];                /* 1: no gradient of the scattering, the shadow network's weights */
     ssdgs_real dssim, normal_weight;
     int exact; /* 1: for poses and lights; 0: with default options, which Gaussians learn from as well */
-    const ssdgs_real *exposure; /* what of settings.ambient comes to each Gaussian; NULL: to be found */
+    const ssdgs_real *sky_share; /* what of settings.ambient comes to each Gaussian; NULL: to be found */
 } ssdgs__photo_job;
 
 /* A photograph's lights: `light`, which may be refined, and those beside its own. */
@@ -9795,16 +9800,16 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     const int tasks = (int)((pixels + SSDGS__PIXELS - 1) / SSDGS__PIXELS);
     options.terms = photo_job->terms;
     options.max_error = 0; /* all that a pixel blends gets a gradient */
-    if (!photo_job->exposure)
+    if (!photo_job->sky_share)
         memcpy(options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
     ssdgs_light *lights;
     ssdgs_result result = ssdgs__photo_lights(context, photo_job->photo, photo_job->light, &lights);
     if (!result)
         result = ssdgs__frame_of_model(frame, model, camera, lights, 1 + photo_job->photo->more_count,
                                        &options, 0, 1);
-    if (!result && photo_job->exposure) { /* set earlier, the frame would find it itself */
+    if (!result && photo_job->sky_share) { /* set earlier, the frame would find it itself */
         memcpy(frame->options.ambient[0], model->settings.ambient, sizeof model->settings.ambient);
-        frame->objects->exposure = photo_job->exposure;
+        frame->objects->sky_share = photo_job->sky_share;
     }
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
@@ -9898,8 +9903,8 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     r->group = group;
     r->bad = 0;
     r->rate.rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
-    r->rate.correct_mean = ssdgs__bias_correction(0.9, trainer->steps[group] + 1);
-    r->rate.correct_square = ssdgs__bias_correction(0.999, trainer->steps[group] + 1);
+    r->rate.correct_mean = ssdgs__bias_correction(0.9, trainer->run.steps[group] + 1);
+    r->rate.correct_square = ssdgs__bias_correction(0.999, trainer->run.steps[group] + 1);
     if (group == SSDGS__G_POSITION) epsilon /= trainer->unit; /* of a move by the bounds' longest side */
     r->rate.epsilon = (ssdgs_real)(epsilon < 1e-15 ? 1e-15 : epsilon < 1e30 ? epsilon : 1e30);
     r->first_chunk = job->chunks;
@@ -9971,11 +9976,11 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
         if (job.range[i].bad)
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
                                "iteration %d refused: the gradient of %s, element %z, is not finite",
-                               trainer->iteration, ssdgs__group_names[job.range[i].group],
+                               trainer->run.iteration, ssdgs__group_names[job.range[i].group],
                                job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
     for (int group = 0; group < SSDGS__GROUPS; group++)
-        trainer->steps[group] +=
+        trainer->run.steps[group] +=
             step->learns[group] && ssdgs__group_used(group, step->terms, model->settings.asg);
     return SSDGS_OK;
 }
@@ -10114,7 +10119,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 static void ssdgs__rearranged(ssdgs_trainer *trainer) {
     trainer->arrangement = ++trainer->model->arrangement;
-    trainer->exposed = 0;
+    trainer->run.sky_ready = 0;
 }
 
 /* Room for `count` Gaussians in the model, the moments and the statistics, which start anew when they move:
@@ -10151,8 +10156,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     trainer->screen_gradient = statistics;
     trainer->screen_count = statistics + capacity;
     trainer->contribution = statistics + 2 * capacity;
-    trainer->exposure = statistics + SSDGS__STATISTICS * capacity;
-    trainer->exposed = 0;
+    trainer->sky_share = statistics + SSDGS__STATISTICS * capacity;
+    trainer->run.sky_ready = 0;
     if (capacity != model->capacity) model->arrangement++;
     trainer->arrangement = model->arrangement;
     trainer->stride = model->capacity = capacity;
@@ -10212,7 +10217,7 @@ static ssdgs_real ssdgs__longest(const ssdgs_trainer *trainer, size_t at) {
    is large. */
 static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to) {
     const ssdgs_train_options *o = &trainer->options;
-    const uint64_t key = o->seed ^ ((uint64_t)trainer->iteration << 32) ^ from;
+    const uint64_t key = o->seed ^ ((uint64_t)trainer->run.iteration << 32) ^ from;
     const size_t stride = trainer->stride;
     ssdgs_real *p = trainer->model->gaussians;
     ssdgs__copy_gaussian(p, stride, to, from);
@@ -10295,7 +10300,7 @@ static void ssdgs__outlines_task(void *data, int chunk) {
 static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char *outside) {
     ssdgs_context *context = trainer->context;
     memset(outside, 0, (size_t)trainer->model->count);
-    if (!(trainer->options.prune_outside > 0) || !trainer->outlines) return SSDGS_OK;
+    if (!(trainer->options.prune_outside > 0) || !trainer->run.outlines) return SSDGS_OK;
     ssdgs_camera *cameras =
         (ssdgs_camera *)ssdgs__allocate(context, (size_t)trainer->photo_count * sizeof *cameras);
     if (!cameras) return SSDGS_ERR_MEMORY;
@@ -10317,11 +10322,12 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)model->count;
-    const double largest = log(0.1 * trainer->extent > 2 * trainer->start_size ? 0.1 * trainer->extent
-                                                                               : 2 * trainer->start_size);
+    const double largest =
+        log(0.1 * trainer->extent > 2 * trainer->run.start_size ? 0.1 * trainer->extent
+                                                                : 2 * trainer->run.start_size);
     const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
     /* opacities were reset since the last control: weights say little */
-    const int before = trainer->iteration - o->batch, last = ssdgs__last_reset(o, before);
+    const int before = trainer->run.iteration - o->batch, last = ssdgs__last_reset(o, before);
     const int recovering = last && last > before - o->densify_every;
     uint64_t *order;
     size_t kept = 0, dropped = 0, wanted = 0;
@@ -10567,12 +10573,12 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
             trainer->context,
             "no random point is inside of the outlines, so these are not used: do bounds_min and bounds_max "
             "hold the object, are masks and poses right?");
-        trainer->outlines = 0;
+        trainer->run.outlines = 0;
         kept = n;
         round = 1;
     }
     for (int c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
-    trainer->start_size = 1.1576 * 0.62035 * pow(volume / ((double)n * round), 1.0 / 3);
+    trainer->run.start_size = 1.1576 * 0.62035 * pow(volume / ((double)n * round), 1.0 / 3);
     for (size_t i = 0; i < kept; i++) {
         ssdgs_real *g = model->gaussians + i;
         double length = 0;
@@ -10581,7 +10587,7 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
         double away[3];
         for (int c = 0; c < 3; c++) {
             g[(size_t)(SSDGS_POSITION + c) * stride] = x[c];
-            g[(size_t)(SSDGS_LOG_SCALE + c) * stride] = (ssdgs_real)log(trainer->start_size);
+            g[(size_t)(SSDGS_LOG_SCALE + c) * stride] = (ssdgs_real)log(trainer->run.start_size);
             away[c] = (u[c] - 0.5) * ((double)o->bounds_max[c] - (double)o->bounds_min[c]);
             length += away[c] * away[c];
         }
@@ -10832,11 +10838,11 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     result = ssdgs__doubt_outlines(trainer);
     if (result) return result;
     for (int i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;
-    trainer->outlines = ssdgs__several(outlined, photo_count, 0.02);
+    trainer->run.outlines = ssdgs__several(outlined, photo_count, 0.02);
     if (empty)
         ssdgs__note(context, "%d photographs of %d are wholly transparent: they show nothing", empty,
                     photo_count);
-    if (!trainer->outlines && empty < photo_count) ssdgs__judge_background(trainer);
+    if (!trainer->run.outlines && empty < photo_count) ssdgs__judge_background(trainer);
     for (int i = 0; i < photo_count; i++) {
         double centre[3];
         ssdgs__camera_centre(&photos[i].camera, centre);
@@ -11003,7 +11009,7 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
                                         o->dssim,
                                         o->normal_weight,
                                         o->refine & ~SSDGS_REFINE_AMBIENT,
-                                        ssdgs__sees_ambient(trainer) ? trainer->exposure : NULL};
+                                        ssdgs__sees_ambient(trainer) ? trainer->sky_share : NULL};
     const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &photo_job, &values);
     if (result) return result;
     ssdgs__moves_of(trainer->photos + photo, correction, frame, correction_gradient);
@@ -11037,16 +11043,16 @@ static ssdgs__batch_layout ssdgs__batch_layout_of(const ssdgs_trainer *trainer) 
     return at;
 }
 
-#define SSDGS__EXPOSE_EVERY 100 /* iterations until what comes to each Gaussian is found anew */
+#define SSDGS__SKY_SHARES_EVERY 100 /* iterations until what comes to each Gaussian is found anew */
 
 /* Finds what of settings.ambient comes to each Gaussian, where the step needs it anew. */
-static ssdgs_result ssdgs__expose_step(ssdgs_trainer *trainer) {
-    const int before = trainer->iteration, last = before - trainer->options.batch;
+static ssdgs_result ssdgs__sky_shares_step(ssdgs_trainer *trainer) {
+    const int before = trainer->run.iteration, last = before - trainer->options.batch;
     if (!ssdgs__sees_ambient(trainer) ||
-        (trainer->exposed && before / SSDGS__EXPOSE_EVERY <= last / SSDGS__EXPOSE_EVERY))
+        (trainer->run.sky_ready && before / SSDGS__SKY_SHARES_EVERY <= last / SSDGS__SKY_SHARES_EVERY))
         return SSDGS_OK;
-    const ssdgs_result result = ssdgs__expose_model(trainer->model, trainer->stride, trainer->exposure);
-    trainer->exposed = !result;
+    const ssdgs_result result = ssdgs__sky_shares(trainer->model, trainer->stride, trainer->sky_share);
+    trainer->run.sky_ready = !result;
     return result;
 }
 
@@ -11067,12 +11073,12 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
     for (int i = own; i > 1; i /= 2) room++;
     ssdgs_real *sums;
     SSDGS__RESERVE(trainer->sums, sums, ssdgs_real, at.size * (size_t)room);
-    ssdgs_result failed = ssdgs__expose_step(trainer);
+    ssdgs_result failed = ssdgs__sky_shares_step(trainer);
     for (int i = 0; i < own && !failed; i++) {
         const int b = first + i;
         ssdgs_real *out = sums + at.size * (size_t)depth++;
         memset(out, 0, at.size * sizeof *out);
-        failed = ssdgs__draw_photo(trainer, step, trainer->iteration + b, photos[b], frame,
+        failed = ssdgs__draw_photo(trainer, step, trainer->run.iteration + b, photos[b], frame,
                                    correction_gradient + SSDGS__CORRECTIONS * b, drawn);
         if (failed) break;
         ssdgs__gather_statistics(trainer, frame, trainer->small_object_gain[photos[b]], out + at.statistics);
@@ -11093,10 +11099,10 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
     if (failed) return failed;
     if (result)
         return ssdgs__fail(context, result, "iteration %d refused: options.sum.add() failed",
-                           trainer->iteration);
+                           trainer->run.iteration);
     if (sums[0] > 0)
         return ssdgs__fail(context, SSDGS_ERR_CANCELLED, "iteration %d refused: another process failed",
-                           trainer->iteration);
+                           trainer->run.iteration);
     const ssdgs_real mean = 1 / (ssdgs_real)batch;
     drawn->loss = (double)(mean * sums[1]);
     drawn->psnr = (double)(mean * sums[2]);
@@ -11139,13 +11145,13 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
 /* Adam on settings.ambient, by the moves of a batch. */
 static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *correction_gradient) {
     ssdgs_settings *s = &trainer->model->settings;
-    const int batch = trainer->options.batch, steps = ++trainer->ambient_steps;
+    const int batch = trainer->options.batch, steps = ++trainer->run.ambient_steps;
     const double end = ssdgs__schedule_end(&trainer->options);
     const double rate = SSDGS__AMBIENT_RATE * (1 - 0.99 * (t < end ? t : end) / end) * sqrt((double)batch);
     for (int c = 0; c < 3; c++) {
         double g = 0;
         for (int i = 0; i < batch; i++) g += correction_gradient[SSDGS__CORRECTIONS * i + 11 + c] / batch;
-        const double step = ssdgs__adam_one(g, trainer->ambient + c, trainer->ambient + 3 + c, steps),
+        const double step = ssdgs__adam_one(g, trainer->run.ambient + c, trainer->run.ambient + 3 + c, steps),
                      value = (double)s->ambient[c] - rate / (double)s->light_scale * step;
         s->ambient[c] = (ssdgs_real)(value > 0 ? value < SSDGS__MOST_LIGHT ? value : SSDGS__MOST_LIGHT : 0);
     }
@@ -11153,7 +11159,7 @@ static void ssdgs__ambient_step(ssdgs_trainer *trainer, double t, const double *
 
 static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     const ssdgs_train_options *o = &trainer->options;
-    const int before = trainer->iteration, after = before + o->batch;
+    const int before = trainer->run.iteration, after = before + o->batch;
     ssdgs_result result = ssdgs__trainer_check(trainer);
     if (result) return result;
     ssdgs__step step;
@@ -11169,7 +11175,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     if (o->batch > 1 || o->sum.add)
         result = ssdgs__draw_batch(trainer, &step, photos, &frame, correction_gradient, &statistics, &drawn);
     else {
-        result = ssdgs__expose_step(trainer);
+        result = ssdgs__sky_shares_step(trainer);
         if (!result)
             result =
                 ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, correction_gradient, &drawn);
@@ -11193,12 +11199,12 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
         const ssdgs_camera *camera = &trainer->photos[photos[0]].camera;
         result = ssdgs__adam_step(trainer, &frame, (double)camera->width * camera->height, &step);
     }
-    trainer->skipped += result != SSDGS_OK;
+    trainer->run.skipped += result != SSDGS_OK;
     for (int i = 0; i < o->batch && !result; i++)
         ssdgs__refine_step(trainer, step.t, photos[i], correction_gradient + SSDGS__CORRECTIONS * i, refines);
     if (!result && refines[3]) ssdgs__ambient_step(trainer, step.t, correction_gradient);
     ssdgs__model_changed(trainer->model);
-    trainer->iteration = after;
+    trainer->run.iteration = after;
     if (!result && ssdgs__schedule_time(o, after) <= o->densify_until) {
         for (size_t k = 0; statistics && k < SSDGS__STATISTICS * trainer->stride; k++)
             trainer->screen_gradient[k] += statistics[k];
@@ -11225,9 +11231,9 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
     if (result) return result;
     result = ssdgs__trainer_step(trainer, stats);
     if (stats) {
-        stats->iteration = trainer->iteration;
+        stats->iteration = trainer->run.iteration;
         stats->gaussians = trainer->model->count;
-        stats->skipped_steps = trainer->skipped;
+        stats->skipped_steps = trainer->run.skipped;
     }
     return ssdgs__leave(trainer->context, result);
 }
@@ -11239,16 +11245,17 @@ SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress 
     if (result) return result;
     ssdgs__leave(trainer->context, SSDGS_OK);
     trainer->running++;
-    while (trainer->iteration < trainer->options.iterations) {
-        const int before = trainer->iteration;
+    while (trainer->run.iteration < trainer->options.iterations) {
+        const int before = trainer->run.iteration;
         ssdgs_train_stats stats;
         result = ssdgs_trainer_step(trainer, &stats);
         bad = result ? bad + 1 : 0;
-        if (bad == 10 || (result && (result != SSDGS_ERR_NONFINITE || trainer->iteration == before))) break;
+        if (bad == 10 || (result && (result != SSDGS_ERR_NONFINITE || trainer->run.iteration == before)))
+            break;
         result = SSDGS_OK;
         if (!progress || progress(user, &stats)) continue;
         result = ssdgs__fail(trainer->context, SSDGS_ERR_CANCELLED, "cancelled at iteration %d",
-                             trainer->iteration);
+                             trainer->run.iteration);
         break;
     }
     trainer->running--;
@@ -11394,7 +11401,7 @@ SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo
 
 /* Reads and writes it in native byte order; another version, precision or run is refused. */
 
-#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK6" /* the last letter changes with the layout */
+#define SSDGS__CHECKPOINT_MAGIC "SSDGSCK7" /* the last letter changes with the layout */
 #define SSDGS__BYTE_ORDER 0x01020304u
 /* Of bytes by the gigabyte: words of 8 in four lanes, each step of which can be undone, so that no changed
    word is lost; then the lanes and the rest. */
@@ -11421,9 +11428,8 @@ typedef struct ssdgs__checkpoint_head { /* then the photographs, the arrays and 
     char magic[8];
     uint32_t byte_order, version, real_size, fused; /* products and sums rounded once: FMA */
     uint64_t global_count;
-    int32_t photo_count, count, iteration, skipped, steps[SSDGS__GROUPS];
-    double start_size, ambient[6];
-    int32_t ambient_steps, exposed, outlines;
+    int32_t photo_count, count;
+    ssdgs__run run;
     ssdgs_settings settings;
     ssdgs_train_options options; /* without sum */
 } ssdgs__checkpoint_head;
@@ -11443,7 +11449,7 @@ static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs
             result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
         if (!result) result = visit(user, shared[i], globals);
     }
-    for (size_t i = 0; i < SSDGS__STATISTICS + 1 && !result; i++) /* and the exposure behind them */
+    for (size_t i = 0; i < SSDGS__STATISTICS + 1 && !result; i++) /* and sky_share behind them */
         result = visit(user, trainer->screen_gradient + i * trainer->stride, n);
     if (!result)
         result =
@@ -11461,14 +11467,7 @@ static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__chec
     head->global_count = trainer->model->global_count;
     head->photo_count = trainer->photo_count;
     head->count = trainer->model->count;
-    head->iteration = trainer->iteration;
-    head->skipped = trainer->skipped;
-    for (int i = 0; i < SSDGS__GROUPS; i++) head->steps[i] = trainer->steps[i];
-    head->start_size = trainer->start_size;
-    memcpy(head->ambient, trainer->ambient, sizeof head->ambient);
-    head->ambient_steps = trainer->ambient_steps;
-    head->exposed = trainer->exposed;
-    head->outlines = trainer->outlines;
+    memcpy(&head->run, &trainer->run, sizeof head->run); /* with its padding */
     head->settings = trainer->model->settings;
     head->options = trainer->options;
     memset(&head->options.sum, 0, sizeof head->options.sum);
@@ -11520,15 +11519,16 @@ static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t 
         head->real_size != sizeof(ssdgs_real) || head->version != SSDGS_VERSION)
         return "it was written by another version or machine";
     if (size < sizeof *head + 8) return "it is cut short";
-    int sound = head->count >= 1 && head->count <= SSDGS__MAX_GAUSSIANS && head->iteration >= 0 &&
-                head->iteration <= 1000000000 && head->skipped >= 0 && head->skipped <= head->iteration &&
-                head->start_size >= 0 && head->start_size < 1e30 && head->ambient_steps >= 0 &&
-                head->ambient_steps <= head->iteration && head->exposed >= 0 && head->exposed <= 1 &&
-                head->outlines >= 0 && head->outlines <= 1;
+    const ssdgs__run *run = &head->run;
+    int sound = head->count >= 1 && head->count <= SSDGS__MAX_GAUSSIANS && run->iteration >= 0 &&
+                run->iteration <= 1000000000 && run->skipped >= 0 && run->skipped <= run->iteration &&
+                run->start_size >= 0 && run->start_size < 1e30 && run->ambient_steps >= 0 &&
+                run->ambient_steps <= run->iteration && run->sky_ready >= 0 && run->sky_ready <= 1 &&
+                run->outlines >= 0 && run->outlines <= 1;
     for (int i = 0; i < SSDGS__GROUPS; i++)
-        sound = sound && head->steps[i] >= 0 && head->steps[i] <= head->iteration;
+        sound = sound && run->steps[i] >= 0 && run->steps[i] <= run->iteration;
     for (int i = 0; i < 6; i++)
-        sound = sound && head->ambient[i] < 1e300 && head->ambient[i] >= (i > 2 ? 0 : -1e300);
+        sound = sound && run->ambient[i] < 1e300 && run->ambient[i] >= (i > 2 ? 0 : -1e300);
     return sound ? NULL : "its counts are out of range";
 }
 
@@ -11597,7 +11597,7 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
                 return 0;
         if (!(fabs(c.value[9]) < 1e30 && c.sure >= 0 && c.sure < 1e300)) return 0;
         for (int j = 0; j < 2; j++)
-            if (c.steps[j] < 0 || c.steps[j] > head->iteration) return 0;
+            if (c.steps[j] < 0 || c.steps[j] > head->run.iteration) return 0;
     }
     return 1;
 }
@@ -11700,19 +11700,12 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
                 "%s: its run rounded otherwise (with or without FMA): it goes on, but not bit for bit", path);
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
-        trainer->iteration = head.iteration;
-        trainer->skipped = head.skipped;
-        trainer->start_size = head.start_size;
-        memcpy(trainer->ambient, head.ambient, sizeof head.ambient);
-        trainer->ambient_steps = head.ambient_steps;
-        for (int i = 0; i < SSDGS__GROUPS; i++) trainer->steps[i] = head.steps[i];
         ssdgs__checkpoint_io io;
         io.bytes = bytes + sizeof head + photos;
         result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
         ssdgs__model_changed(trainer->model);
         ssdgs__rearranged(trainer);
-        trainer->exposed = head.exposed;
-        trainer->outlines = head.outlines;
+        trainer->run = head.run;
     }
     ssdgs__release(context, bytes);
     return result;
@@ -11736,7 +11729,7 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
         ssdgs__checkpoint_head head;
         const char *reason = ssdgs__checkpoint_head_of(bytes, size, &head);
         if (reason) result = ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
-        else *iteration = head.iteration;
+        else *iteration = head.run.iteration;
     }
     ssdgs__release(context, bytes);
     return ssdgs__leave(context, result);

@@ -451,7 +451,7 @@ static void run(bench *b, job *j, int view, ssdgs_render_stats *stats) {
         camera.view[8 + i] = -camera.view[8 + i];
     }
     if (j->trainer) {
-        j->trainer->iteration = j->iteration + view;
+        j->trainer->run.iteration = j->iteration + view;
         check(j->s->context, ssdgs_trainer_step(j->trainer, NULL));
     } else
         check(j->s->context,

@@ -105,7 +105,7 @@ static void close_process(process *p) {
 static uint64_t state_of(const process *p) {
     const ssdgs_trainer *t = p->trainer;
     const size_t n = (size_t)p->model->count * sizeof(ssdgs_real);
-    uint64_t hash = ssdgs__fold(1, &t->iteration, sizeof t->iteration);
+    uint64_t hash = ssdgs__fold(1, &t->run.iteration, sizeof t->run.iteration);
     for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
         hash = ssdgs__fold(hash, p->model->gaussians + c * p->model->capacity, n);
         hash = ssdgs__fold(hash, t->mean + c * t->stride, n);
@@ -114,7 +114,7 @@ static uint64_t state_of(const process *p) {
     for (size_t c = 0; c < SSDGS__STATISTICS; c++)
         hash = ssdgs__fold(hash, t->screen_gradient + c * t->stride, n);
     hash = ssdgs__fold(hash, p->model->globals, p->model->global_count * sizeof(ssdgs_real));
-    hash = ssdgs__fold(hash, t->steps, sizeof t->steps);
+    hash = ssdgs__fold(hash, t->run.steps, sizeof t->run.steps);
     return ssdgs__fold(hash, t->corrections, PHOTOS * sizeof *t->corrections);
 }
 
@@ -273,18 +273,18 @@ static void test_failures(void) {
     CHECK(strstr(ssdgs_error_message(p.context), "another process failed") != NULL);
     total[0] = 0;
     total[at.gradient + 3] = NAN; /* refused by all alike; its photographs are passed over */
-    CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_NONFINITE && p.trainer->iteration == BATCH);
+    CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_NONFINITE && p.trainer->run.iteration == BATCH);
     free(total);
     close_process(&p);
     /* light from all around, found anew before the first photograph, fails alike */
     memset(&gpu, 0, sizeof gpu);
     gpu.stage[SSDGS_STAGE_WALK] = shade;
     open_process(&p, &options, 0, 2, &gpu);
-    p.trainer->exposed = 1;
-    p.trainer->iteration = 100; /* every hundredth */
+    p.trainer->run.sky_ready = 1;
+    p.trainer->run.iteration = 100; /* every hundredth */
     fails = 1;
     CHECK(ssdgs_trainer_step(p.trainer, NULL) == SSDGS_ERR_LIMIT && p.calls == 1 && p.part[0] == 1);
-    CHECK(!p.trainer->exposed);
+    CHECK(!p.trainer->run.sky_ready);
     close_process(&p);
     static const int wrong[5][3] = {
         {0, 0, 2}, {2, 2, 2}, {-1, 2, 2}, {0, 3, 2}, {0, 0, 257}}; /* rank, of, batch */

@@ -363,9 +363,7 @@ static uint64_t held(void) {
     const ssdgs_trainer *t = trainer;
     uint64_t hash = model ? hash_model(SEED, model) : SEED;
     if (!t) return hash;
-    hash = ssdgs__fold(hash, &t->iteration, sizeof t->iteration);
-    hash = ssdgs__fold(hash, &t->skipped, sizeof t->skipped);
-    hash = ssdgs__fold(hash, t->steps, sizeof t->steps);
+    hash = ssdgs__fold(hash, &t->run, sizeof t->run);
     for (int i = 0; i < SSDGS_CHANNELS; i++) {
         hash = ssdgs__fold(hash, t->mean + (size_t)i * t->stride, (size_t)model->count * sizeof(ssdgs_real));
         hash =
@@ -535,7 +533,7 @@ static void test_memory(void) {
             begin(op);
             const int for_ever = n >= calls;
             const long live = memory.live;
-            const int at = trainer ? trainer->iteration : 0;
+            const int at = trainer ? trainer->run.iteration : 0;
             memory.fail_at = 1 + n % calls;
             memory.for_ever = for_ever;
             error[0] = 0;
@@ -543,7 +541,8 @@ static void test_memory(void) {
             memory.fail_at = 0;
             wrong += !strstr(error[0] ? error : ssdgs_error_message(context), "out of memory");
             wrong += !op->frames && memory.live != live;
-            if (trainer && trainer->iteration != at) { /* the step was done, its density control was not */
+            if (trainer &&
+                trainer->run.iteration != at) { /* the step was done, its density control was not */
                 wrong += held() != plain_step || step() || !finite_model(model);
                 uncontrolled++;
             } else {
@@ -867,12 +866,13 @@ static void test_checkpoints(void) {
     }
     CHECK(trainer->corrections[0].steps[1] > 0);
     for (int outlines = 0; outlines < 2; outlines++) { /* 0: as where no random point is inside of them */
-        trainer->outlines = outlines;
+        trainer->run.outlines = outlines;
+        const uint64_t saved = held();
         CHECK(!ssdgs_trainer_save(trainer, file_path));
         end_world();
         with_trainer();
-        trainer->outlines = !outlines;
-        CHECK(!ssdgs_trainer_load(trainer, file_path) && held() == before && trainer->outlines == outlines);
+        trainer->run.outlines = !outlines;
+        CHECK(!ssdgs_trainer_load(trainer, file_path) && held() == saved);
     }
     end_world();
     with_trainer();
@@ -902,13 +902,13 @@ static void test_checkpoints(void) {
         const size_t held_bytes = memory.bytes;
         spill(file_path, whole.data, sizeof h + 8);
         memory.peak = held_bytes;
-        CHECK(!ssdgs_checkpoint_iteration(context, run_path, &iteration) && iteration == h.iteration);
+        CHECK(!ssdgs_checkpoint_iteration(context, run_path, &iteration) && iteration == h.run.iteration);
         CHECK(memory.peak - held_bytes < 4096);
-        CHECK(!ssdgs_checkpoint_iteration(context, file_path, &iteration) && iteration == h.iteration);
+        CHECK(!ssdgs_checkpoint_iteration(context, file_path, &iteration) && iteration == h.run.iteration);
         spill(file_path, whole.data, sizeof h + 7);
         CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration) == SSDGS_ERR_FORMAT && !iteration);
         head lie = h;
-        lie.iteration = -5;
+        lie.run.iteration = -5;
         memcpy(whole.data, &lie, sizeof lie);
         spill(file_path, whole.data, whole.size);
         CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration) == SSDGS_ERR_FORMAT && !iteration);
@@ -921,62 +921,63 @@ static void test_checkpoints(void) {
             size_t at;
             int type;
             double value;
-        } lies[] = {/* with the right checksum */
-                    {"magic", 0, WORD, 7},
-                    {"byte order", offsetof(head, byte_order), WORD, 0x04030201},
-                    {"version", offsetof(head, version), WORD, SSDGS_VERSION + 1},
-                    {"precision", offsetof(head, real_size), WORD, 2},
-                    {"seed", offsetof(head, options.seed), WORD, 1},
-                    {"background", offsetof(head, options.background[2]), REAL, nan_value},
-                    {"rate", offsetof(head, options.rates.light.end), REAL, infinite},
-                    {"camera", hashes, WORD, 1},
-                    {"lights", hashes + offsetof(ssdgs__checkpoint_photo, lights), WORD, 1},
-                    {"pixels", parameters - sizeof(uint64_t), WORD, 1},
-                    {"globals", offsetof(head, global_count), WORD, 1},
-                    {"photographs", offsetof(head, photo_count), WORD, PHOTOS + 1},
-                    {"photographs", offsetof(head, photo_count), WORD, -1},
-                    {"count", offsetof(head, count), WORD, 0},
-                    {"count", offsetof(head, count), WORD, -1},
-                    {"count", offsetof(head, count), WORD, (double)h.count + 1},
-                    {"count", offsetof(head, count), WORD, 0x7fffffff},
-                    {"iteration", offsetof(head, iteration), WORD, -1},
-                    {"iteration", offsetof(head, iteration), WORD, 0x7fffffff},
-                    {"skipped", offsetof(head, skipped), WORD, -1},
-                    {"skipped", offsetof(head, skipped), WORD, 0x7fffffff},
-                    {"steps", offsetof(head, steps), WORD, -1},
-                    {"steps", offsetof(head, steps), WORD, (double)h.iteration + 1},
-                    {"ambient light's moment", offsetof(head, ambient), DOUBLE, infinite},
-                    {"ambient light's square", offsetof(head, ambient) + 5 * sizeof(double), DOUBLE, -1},
-                    {"ambient light's steps", offsetof(head, ambient_steps), WORD, -1},
-                    {"ambient light's steps", offsetof(head, ambient_steps), WORD, (double)h.iteration + 1},
-                    {"exposed", offsetof(head, exposed), WORD, 2},
-                    {"outlines", offsetof(head, outlines), WORD, -1},
-                    {"outlines", offsetof(head, outlines), WORD, 2},
-                    {"settings", offsetof(head, settings), WORD, 0},
-                    {"terms", offsetof(head, settings.terms), WORD, 16},
-                    {"width", offsetof(head, settings.scattering.width), WORD, 1024},
-                    {"octaves", offsetof(head, settings.octaves.view), WORD, 3},
-                    {"octaves", offsetof(head, settings.octaves.light), WORD, 3},
-                    {"eta", offsetof(head, settings.eta), REAL, 9},
-                    {"eta", offsetof(head, settings.eta), REAL, nan_value},
-                    {"unit", offsetof(head, settings.length_unit), REAL, 0},
-                    {"light scale", offsetof(head, settings.light_scale), REAL, infinite},
-                    {"ambient", offsetof(head, settings.ambient), REAL, -1},
-                    {"centre", offsetof(head, settings.centre), REAL, nan_value},
-                    {"network", moments - 4 * sizeof(ssdgs_real), REAL, nan_value},
-                    {"moment", moments + 5 * sizeof(ssdgs_real), REAL, nan_value},
-                    {"moment", squares - 5 * sizeof(ssdgs_real), REAL, infinite},
-                    {"square", squares + 5 * sizeof(ssdgs_real), REAL, -1},
-                    {"square", squares, REAL, nan_value},
-                    {"square", statistics - sizeof(ssdgs_real), REAL, -1},
-                    {"statistic", statistics, REAL, nan_value},
-                    {"statistic", corrections - sizeof(ssdgs_real), REAL, infinite},
-                    {"camera", corrections + offsetof(ssdgs__correction, value), DOUBLE, nan_value},
-                    {"camera's moment", corrections + offsetof(ssdgs__correction, mean), DOUBLE, infinite},
-                    {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},
-                    {"intensity", corrections + offsetof(ssdgs__correction, sure), DOUBLE, infinite},
-                    {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, -5},
-                    {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}};
+        } lies[] = {
+            /* with the right checksum */
+            {"magic", 0, WORD, 7},
+            {"byte order", offsetof(head, byte_order), WORD, 0x04030201},
+            {"version", offsetof(head, version), WORD, SSDGS_VERSION + 1},
+            {"precision", offsetof(head, real_size), WORD, 2},
+            {"seed", offsetof(head, options.seed), WORD, 1},
+            {"background", offsetof(head, options.background[2]), REAL, nan_value},
+            {"rate", offsetof(head, options.rates.light.end), REAL, infinite},
+            {"camera", hashes, WORD, 1},
+            {"lights", hashes + offsetof(ssdgs__checkpoint_photo, lights), WORD, 1},
+            {"pixels", parameters - sizeof(uint64_t), WORD, 1},
+            {"globals", offsetof(head, global_count), WORD, 1},
+            {"photographs", offsetof(head, photo_count), WORD, PHOTOS + 1},
+            {"photographs", offsetof(head, photo_count), WORD, -1},
+            {"count", offsetof(head, count), WORD, 0},
+            {"count", offsetof(head, count), WORD, -1},
+            {"count", offsetof(head, count), WORD, (double)h.count + 1},
+            {"count", offsetof(head, count), WORD, 0x7fffffff},
+            {"iteration", offsetof(head, run.iteration), WORD, -1},
+            {"iteration", offsetof(head, run.iteration), WORD, 0x7fffffff},
+            {"skipped", offsetof(head, run.skipped), WORD, -1},
+            {"skipped", offsetof(head, run.skipped), WORD, 0x7fffffff},
+            {"steps", offsetof(head, run.steps), WORD, -1},
+            {"steps", offsetof(head, run.steps), WORD, (double)h.run.iteration + 1},
+            {"ambient light's moment", offsetof(head, run.ambient), DOUBLE, infinite},
+            {"ambient light's square", offsetof(head, run.ambient) + 5 * sizeof(double), DOUBLE, -1},
+            {"ambient light's steps", offsetof(head, run.ambient_steps), WORD, -1},
+            {"ambient light's steps", offsetof(head, run.ambient_steps), WORD, (double)h.run.iteration + 1},
+            {"sky_ready", offsetof(head, run.sky_ready), WORD, 2},
+            {"outlines", offsetof(head, run.outlines), WORD, -1},
+            {"outlines", offsetof(head, run.outlines), WORD, 2},
+            {"settings", offsetof(head, settings), WORD, 0},
+            {"terms", offsetof(head, settings.terms), WORD, 16},
+            {"width", offsetof(head, settings.scattering.width), WORD, 1024},
+            {"octaves", offsetof(head, settings.octaves.view), WORD, 3},
+            {"octaves", offsetof(head, settings.octaves.light), WORD, 3},
+            {"eta", offsetof(head, settings.eta), REAL, 9},
+            {"eta", offsetof(head, settings.eta), REAL, nan_value},
+            {"unit", offsetof(head, settings.length_unit), REAL, 0},
+            {"light scale", offsetof(head, settings.light_scale), REAL, infinite},
+            {"ambient", offsetof(head, settings.ambient), REAL, -1},
+            {"centre", offsetof(head, settings.centre), REAL, nan_value},
+            {"network", moments - 4 * sizeof(ssdgs_real), REAL, nan_value},
+            {"moment", moments + 5 * sizeof(ssdgs_real), REAL, nan_value},
+            {"moment", squares - 5 * sizeof(ssdgs_real), REAL, infinite},
+            {"square", squares + 5 * sizeof(ssdgs_real), REAL, -1},
+            {"square", squares, REAL, nan_value},
+            {"square", statistics - sizeof(ssdgs_real), REAL, -1},
+            {"statistic", statistics, REAL, nan_value},
+            {"statistic", corrections - sizeof(ssdgs_real), REAL, infinite},
+            {"camera", corrections + offsetof(ssdgs__correction, value), DOUBLE, nan_value},
+            {"camera's moment", corrections + offsetof(ssdgs__correction, mean), DOUBLE, infinite},
+            {"camera's square", corrections + offsetof(ssdgs__correction, square), DOUBLE, -1},
+            {"intensity", corrections + offsetof(ssdgs__correction, sure), DOUBLE, infinite},
+            {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, -5},
+            {"camera's steps", corrections + offsetof(ssdgs__correction, steps), WORD, 0x7fffffff}};
         for (size_t k = 0; k <= sizeof lies / sizeof *lies; k++) {
             const int last = k == sizeof lies / sizeof *lies; /* another rounding: taken, and told */
             unsigned char *lie = (unsigned char *)malloc(whole.size);
@@ -1278,7 +1279,7 @@ static int whole_run(void) {
     disk.pause = 100000;
     with_trainer();
     if (!access(file_path, F_OK) && ssdgs_trainer_load(trainer, file_path)) return 1;
-    while (trainer->iteration < options.iterations) {
+    while (trainer->run.iteration < options.iterations) {
         if (step()) return 2;
         if (ssdgs_trainer_save(trainer, file_path)) return 3;
     }

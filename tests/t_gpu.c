@@ -54,7 +54,7 @@ static void upload_walk(const ssdgs_frame *frame) {
     upload_seen(seen, n);
     gpu_upload(device, &f->gaussians, v->gaussians, SSDGS_CHANNELS * v->stride * sizeof(float));
     gpu_upload_networks(device, frame->objects);
-    gpu_upload_exposures(device, frame->objects);
+    gpu_upload_sky_shares(device, frame->objects);
     gpu_upload(device, &f->visibility, frame->visibility, all);
     if (frame->depth_cue) gpu_upload(device, &f->depth_cue, frame->depth_cue, all);
     if (frame->flux) gpu_upload(device, &f->flux, frame->flux, all);

@@ -244,7 +244,7 @@ static void run(const scene *s) {
     { /* ambient light, which its bound of 0 leaves */
         tally t = {0, 0, 0, 0};
         scene lit = *s;
-        for (int c = 0; c < 3 && frame.objects->exposure; c++)
+        for (int c = 0; c < 3 && frame.objects->sky_share; c++)
             compare(&lit, model, &camera, lights, &fixed, lit.options.ambient[0] + c, ambient_gradient[c],
                     &t);
         if (t.tried) finish(s, "ambient light", &t);

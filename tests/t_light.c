@@ -391,7 +391,8 @@ static void test_ambient_highlight(int asg) {
     ssdgs_model_destroy(single);
 }
 
-/* The exposures against those of many directions; light over the whole sky adds to that of lights. */
+/* The shares of an even sky against those of many directions; light over the whole sky adds to that of
+ * lights. */
 static void test_ambient_cloud(ssdgs_model *model, int number) {
     enum { MANY = 300, MOST = 400 };
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
@@ -415,14 +416,14 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
     const int count = model->count;
     ssdgs__frame_memory *memory = NULL;
     CHECK(count <= MOST);
-    memcpy(found, model->exposure, (size_t)count * sizeof *found);
+    memcpy(found, model->sky_share, (size_t)count * sizeof *found);
     memset(many, 0, sizeof many);
     memset(sums, 0, sizeof sums);
     for (int i = 0; i < MANY; i++) {
         double d[3];
         direction_of(i, MANY, d);
         const ssdgs_real direction[3] = {(ssdgs_real)d[0], (ssdgs_real)d[1], (ssdgs_real)d[2]};
-        CHECK(!ssdgs__expose_from(model, &memory, direction, many, sums));
+        CHECK(!ssdgs__sky_shares_from(model, &memory, direction, many, sums));
     }
     ssdgs__frame_memory_destroy(context, memory);
     double error2 = 0, mean = 0, low = 1, high = 0;
@@ -434,24 +435,24 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
         high = fmax(high, (double)many[i]);
     }
     if (!real64)
-        printf("figure exposure_%d %.3f RMS from that of %d directions, mean %.2f, from %.2f to %.2f\n",
+        printf("figure sky_share_%d %.3f RMS from that of %d directions, mean %.2f, from %.2f to %.2f\n",
                number, sqrt(error2), MANY, mean, low, high);
     CHECK(sqrt(error2) < 0.1 && high - low > 0.4);
     /* all that ambient light brings goes with them; they are found once */
     for (int half = 0; half < 2; half++) {
-        for (int i = 0; i < count; i++) model->exposure[i] = found[i] * (half ? (ssdgs_real)0.5 : 1);
+        for (int i = 0; i < count; i++) model->sky_share[i] = found[i] * (half ? (ssdgs_real)0.5 : 1);
         alone(model, &camera, NULL, 0, &options, shot + half);
     }
     for (int i = 0; i < 3 * PIXELS; i++) shot[0].value[i] *= (ssdgs_real)0.5;
-    CHECK_NEAR(shot[1].value, shot[0].value, 3 * PIXELS, exactly(1e-7), exactly(1e-5), "half exposed");
-    memcpy(model->exposure, found, (size_t)count * sizeof *found);
+    CHECK_NEAR(shot[1].value, shot[0].value, 3 * PIXELS, exactly(1e-7), exactly(1e-5), "half of the sky");
+    memcpy(model->sky_share, found, (size_t)count * sizeof *found);
     /* once a model, until it changes */
-    const uint64_t known = model->exposure_revision;
+    const uint64_t known = model->sky_share_revision;
     alone(model, &camera, NULL, 0, &options, shot + 1);
-    CHECK(model->exposure_revision == known);
+    CHECK(model->sky_share_revision == known);
     (void)ssdgs_model_arrays(model);
     alone(model, &camera, NULL, 0, &options, shot + 2);
-    CHECK(model->exposure_revision != known && same(shot + 1, shot + 2));
+    CHECK(model->sky_share_revision != known && same(shot + 1, shot + 2));
     options.ambient[3][1] = (ssdgs_real)NAN;
     const ssdgs_image image = planes_of(shot);
     CHECK(ssdgs_render_ex(model, &camera, NULL, 0, &options, &image, NULL) == SSDGS_ERR_NONFINITE);
@@ -459,7 +460,7 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
 }
 
 /* A sheet across each axis hides the sky from what faces it. */
-static void test_exposure_of_a_sheet(void) {
+static void test_sky_shares_of_a_sheet(void) {
     enum { ROW = 21, SHEET = ROW * ROW };
     const ssdgs_settings settings = small_settings();
     for (int axis = 0; axis < 3; axis++) {
@@ -485,7 +486,7 @@ static void test_exposure_of_a_sheet(void) {
             CHECK(!ssdgs_model_set(model, i, &g));
         }
         alone(model, &camera, NULL, 0, &options, shot);
-        CHECK(model->exposure[SHEET] > (ssdgs_real)0.85 && model->exposure[SHEET + 1] < (ssdgs_real)0.25);
+        CHECK(model->sky_share[SHEET] > (ssdgs_real)0.85 && model->sky_share[SHEET + 1] < (ssdgs_real)0.25);
         ssdgs_model_destroy(model);
     }
 }
@@ -721,7 +722,7 @@ int main(void) {
     test_deep();
     test_ambient_highlight(SSDGS_ASG_DEFERRED);
     test_ambient_highlight(SSDGS_ASG_GEOMETRIC);
-    test_exposure_of_a_sheet();
+    test_sky_shares_of_a_sheet();
     test_of_two_kinds();
     TEST_ROW("91", "environment maps", test_environment_sums());
     test_refused();

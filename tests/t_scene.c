@@ -1766,7 +1766,7 @@ static void test_moved_over(void) {
     comes = cloud(&s, 0, 300, 0.5);
     alone(comes, &camera, &light, 1, &options, shot);
     ssdgs_model_arrays(comes).gaussians[0] += 1;
-    two->revisions = comes->exposure_revision - 1;
+    two->revisions = comes->sky_share_revision - 1;
     CHECK(!ssdgs_model_move(comes, two));
     alone(comes, &camera, &light, 1, &options, shot);
     ssdgs_model_arrays(comes);

@@ -239,7 +239,7 @@ static uint64_t hash_trainer(const ssdgs_trainer *t) {
                  globals = t->model->global_count * sizeof(ssdgs_real);
     uint64_t hash = fnv(fnv(hash_model(t->model), t->mean, planes), t->square, planes);
     hash = fnv(fnv(hash, t->global_mean, globals), t->global_square, globals);
-    hash = fnv(fnv(hash, t->steps, sizeof t->steps), t->corrections,
+    hash = fnv(fnv(hash, t->run.steps, sizeof t->run.steps), t->corrections,
                (size_t)t->photo_count * sizeof *t->corrections);
     return fnv(hash, t->screen_gradient, SSDGS__STATISTICS * t->stride * sizeof(ssdgs_real));
 }
@@ -298,7 +298,7 @@ static void row_54(void) {
         s.until = i == 9 ? 12 : 11;
         s.spared = i == 9 ? 10 : 0;
         CHECK(ssdgs_trainer_run(t.trainer, NULL, NULL) == (i == 9 ? SSDGS_OK : SSDGS_ERR_NONFINITE));
-        CHECK(t.trainer->iteration == s.until && t.trainer->skipped == 10 && ALL_FINITE(t.model));
+        CHECK(t.trainer->run.iteration == s.until && t.trainer->run.skipped == 10 && ALL_FINITE(t.model));
         finish(&t);
     }
 }
@@ -467,7 +467,7 @@ static void row_57(void) {
         training t = start(new_context(SSDGS_ISA_AUTO, 2, NULL, NULL), NULL, NULL, &o, i ? PHOTOS : 1);
         CHECK(fabs(t.trainer->extent - 1.1 * 2) < 1e-6);
         steps(&t, 30);
-        CHECK(ALL_FINITE(t.model) && t.trainer->skipped == 0);
+        CHECK(ALL_FINITE(t.model) && t.trainer->run.skipped == 0);
         finish(&t);
     }
 }

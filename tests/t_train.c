@@ -306,9 +306,9 @@ static void test_resume(void) {
             ssdgs__checkpoint_head head;
             memcpy(&head, copy, sizeof head);
             if (i == 0) head.settings.scattering.width = 1024;
-            if (i == 1) head.steps[3] = -2;
+            if (i == 1) head.run.steps[3] = -2;
             if (i == 2) head.count = 0x0FFFFFFF;
-            if (i == 4) head.start_size = -1;
+            if (i == 4) head.run.start_size = -1;
             memcpy(copy, &head, sizeof head);
             memcpy(&last, corrected, sizeof last);
             if (i == 3) last.steps[1] = -1;
@@ -327,8 +327,8 @@ static void test_resume(void) {
         ssdgs_trainer_destroy(trainer);
         CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &options,
                                     &trainer)); /* on Gaussians: none were drawn */
-        CHECK(trainer->start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") &&
-              trainer->start_size > 0);
+        CHECK(trainer->run.start_size == 0 && !ssdgs_trainer_load(trainer, "build/t_train.ckpt") &&
+              trainer->run.start_size > 0);
         ssdgs_trainer_destroy(trainer);
         for (int i = 0; i < 8; i++) { /* bias, filter, eta, near plane, format, dipole, medium, octaves */
             ssdgs_settings changed = settings;
@@ -1144,7 +1144,7 @@ static void test_ambient(void) {
                            (SSDGS__AMBIENT_RATE * sqrt((double)batch)) -
                        1) < 1e-3);
         CHECK(!ssdgs_trainer_run(trainer, NULL, NULL));
-        trainer->iteration += 480; /* steps behind the end go on at the last rate, down the slope */
+        trainer->run.iteration += 480; /* steps behind the end go on at the last rate, down the slope */
         for (int i = 0; i < 30; i++) CHECK(!ssdgs_trainer_step(trainer, NULL));
         for (int c = 0; c < 3; c++)
             if (!CHECK(fabs((double)(model->settings.ambient[c] / ambient[c]) - 1) < 0.02))
@@ -1370,7 +1370,7 @@ static void test_one_light(void) {
             ssdgs__drawn drawn;
             ssdgs_frame frame;
             trainer->one_light = k ? known : 0;
-            CHECK(!ssdgs__expose_model(model, trainer->stride, trainer->exposure));
+            CHECK(!ssdgs__sky_shares(model, trainer->stride, trainer->sky_share));
             CHECK(!ssdgs__draw_photo(trainer, &step, 0, 1, &frame, moves, &drawn));
             for (int c = 0; c < SSDGS_CHANNELS; c++)
                 for (int i = 0; i < MANY; i++)
@@ -1660,7 +1660,7 @@ static void test_cap(void) {
             trainer->contribution[i] = i >= MANY - UNSEEN ? 0 : 50;
             trainer->screen_gradient[i] = i == 0 && pass ? 2 : 0;
         }
-        trainer->iteration = pass == 2 ? 40 : 50; /* opacities are reset at 30 */
+        trainer->run.iteration = pass == 2 ? 40 : 50; /* opacities are reset at 30 */
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == options.max_gaussians);
         int i, found;
@@ -2085,7 +2085,7 @@ static void test_prune_outside(void) {
             left += stays[i];
         }
         CHECK((pass ? left > MANY / 10 && left < 9 * MANY / 10 : left == MANY) && unseen > 0);
-        trainer->iteration = 40; /* opacities were reset at 30 */
+        trainer->run.iteration = 40; /* opacities were reset at 30 */
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == left);
         for (int i = 0; i < model->count; i++)
@@ -2205,7 +2205,8 @@ static void test_wrong_outlines(void) {
         if (!CHECK(left_out == cases[i].doubted && heard[WRONG] == (left_out > 0) &&
                    (!left_out || told == left_out)))
             printf("    case %d: %d of %d\n", (int)i, left_out, cases[i].doubted);
-        CHECK((trainer->outlines == 0) == (heard[NO_POINT] > 0) && !heard[NO_POINT] == (i != 4 && i != 7));
+        CHECK((trainer->run.outlines == 0) == (heard[NO_POINT] > 0) &&
+              !heard[NO_POINT] == (i != 4 && i != 7));
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
     }
@@ -2550,7 +2551,7 @@ static void test_outlines_known(void) {
         }
         CHECK(!ssdgs_model_create(context, NULL, 1, &model));
         if (!CHECK(!ssdgs_trainer_create(model, shots, cases[i].photographs, &options, &trainer))) exit(1);
-        CHECK(trainer->outlines == cases[i].known);
+        CHECK(trainer->run.outlines == cases[i].known);
         for (int k = 0; k < cases[i].photographs; k++)
             CHECK((trainer->transparent[k] != 0) == (k < cases[i].outlined));
         { /* where an object fills less than 0.15 of the picture, screen gradients count for more */
@@ -2702,7 +2703,7 @@ static void test_two(size_t longest) {
         trainer->screen_gradient[i] = 3 * (ssdgs_real)(i == STAYS ? 0.9 : 1.1);
     }
     for (size_t i = 0; i < SSDGS_CHANNELS * trainer->stride; i++) trainer->mean[i] = trainer->square[i] = 1;
-    trainer->iteration = 50;
+    trainer->run.iteration = 50;
     CHECK(!ssdgs__densify(trainer) && model->count == 5);
     p = model->gaussians;
     const size_t stride = model->capacity;

@@ -201,7 +201,7 @@ typedef struct gpu_frame {
     gpu_buffer seen, visibility, depth_cue, flux;
     gpu_buffer shaded, color, layers; /* shaded: its count, then the Gaussians */
     gpu_buffer pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow;
-    gpu_buffer networks, lamps, exposures, tally, neighbours; /* of SHADE */
+    gpu_buffer networks, lamps, sky_shares, tally, neighbours; /* of SHADE */
     gpu_buffer nodes, transport, arrived; /* arrived: the revision, (lights, blocks of 64 Gaussians) */
     gpu_buffer faces;                     /* of the highlights */
 } gpu_frame;
@@ -229,7 +229,7 @@ struct gpu {
     size_t instance_room; /* of each view */
     const void *model;    /* which one, of which revision, is uploaded */
     uint64_t revision;
-    int exposed;         /* 1: the buffer `exposures` is this model's */
+    int sky_ready;       /* 1: the buffer `sky_shares` is this model's */
     uint32_t revisions;  /* that flux has had so far */
     double detail;       /* options.transport_detail that transport has */
     int busy;            /* 1: programs may still run */
@@ -620,9 +620,9 @@ static void gpu_upload_networks(gpu *g, const ssdgs_placed *o) {
 }
 
 /* What of ambient light comes to each Gaussian. */
-static void gpu_upload_exposures(gpu *g, const ssdgs_placed *o) {
-    gpu_upload(g, &g->frame.exposures, o->exposure,
-               o->exposure ? (size_t)o->gaussians.count * sizeof(float) : 0);
+static void gpu_upload_sky_shares(gpu *g, const ssdgs_placed *o) {
+    gpu_upload(g, &g->frame.sky_shares, o->sky_share,
+               o->sky_share ? (size_t)o->gaussians.count * sizeof(float) : 0);
 }
 
 static double gpu_sigmoid(double x) { return 1 / (1 + exp(-x)); }
@@ -669,7 +669,7 @@ static int32_t gpu_flags(const ssdgs_frame *frame) {
            (s->residual_shadow ? GPU_RESIDUAL_SHADOW : 0) |
            (s->shadow_on_scattering ? GPU_SHADOW_ON_SCATTERING : 0) |
            (s->per_channel_optics ? GPU_PER_CHANNEL_OPTICS : 0) |
-           (s->dipole == SSDGS_DIPOLE_PRINTED ? GPU_PRINTED_DIPOLE : 0) | (o->exposure ? GPU_AMBIENT : 0) |
+           (s->dipole == SSDGS_DIPOLE_PRINTED ? GPU_PRINTED_DIPOLE : 0) | (o->sky_share ? GPU_AMBIENT : 0) |
            (medium ? GPU_MEDIUM : 0) | (frame->visibility_given ? GPU_VISIBILITY_GIVEN : 0);
 }
 
@@ -875,7 +875,7 @@ static void gpu_shade(gpu *g, const ssdgs_frame *frame) {
     gpu_frame *f = &g->frame;
     const gpu_lighting k = gpu_lighting_of(frame);
     const gpu_buffer *const buffers[] = {&f->networks,     &f->lamps,     &f->gaussians, &f->shaded,
-                                         &f->visibility,   &f->depth_cue, &f->transport, &f->exposures,
+                                         &f->visibility,   &f->depth_cue, &f->transport, &f->sky_shares,
                                          &f->camera.depth, &f->color,     &f->layers,    NULL};
     gpu_reserve(g, &f->shaded, (n + 1) * sizeof(uint32_t));
     gpu_reserve(g, &f->neighbours, n * sizeof(uint32_t));
@@ -1166,8 +1166,8 @@ static void gpu_upload_model(gpu *g, const ssdgs_placed *o) {
         gpu_upload(g, &g->frame.gaussians, v->gaussians, v->stride * SSDGS_CHANNELS * sizeof(float));
         gpu_upload_networks(g, o);
     }
-    if (!known || !g->exposed) gpu_upload_exposures(g, o);
-    g->exposed = o->exposure != NULL;
+    if (!known || !g->sky_ready) gpu_upload_sky_shares(g, o);
+    g->sky_ready = o->sky_share != NULL;
     g->model = g->result ? NULL : o->model;
     g->revision = o->revision;
 }

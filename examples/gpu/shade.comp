@@ -176,12 +176,12 @@ vec3 ambient_at(vec3 n) {
 }
 /* Light from all around falls as from along the normal, and a highlight mirrors what is around its
    direction. */
-void find_ambient_geometry(float exposure) {
+void find_ambient_geometry(float sky_share) {
     float facing = dot(axes[2], wo);
     float steep = on(deferred) ? min(1.0, max(0.0, facing) / 0.25) : 1.0;
     float f0 = on(deferred) ? sigmoid(raw(asg_weight + 2) - 3.1780538303479458) : 0.04;
     wi = axes[2];
-    irradiance = exposure;
+    irradiance = sky_share;
     cosine = 1.0;
     facing = clamp(facing, 0.0, 1.0);
     gloss = on(specular_term) ? schlick(f0, 1.0 - facing) * lobe_energy() : 0.0;
@@ -194,7 +194,7 @@ layout(std430, binding = 3) readonly buffer shaded_block { uint shaded_count; ui
 layout(std430, binding = 4) readonly buffer visibility_block { float visibilities[]; };
 layout(std430, binding = 5) readonly buffer cue_block { float cues[]; };
 layout(std430, binding = 6) readonly buffer transport_block { float transported[]; };
-layout(std430, binding = 7) readonly buffer exposure_block { float exposures[]; };
+layout(std430, binding = 7) readonly buffer sky_share_block { float sky_shares[]; };
 layout(std430, binding = 8) readonly buffer depth_block { float depths[]; };
 layout(std430, binding = 9) writeonly buffer color_block { vec4 colors[]; };
 shared uint lit;
@@ -259,7 +259,7 @@ void add_light(int i) {
 void add_ambient() {
     float arrives[lengths];
     vec3 before[3] = vec3[3](diffuse_sum, specular_sum, scattering_sum);
-    if (mine) find_ambient_geometry(exposures[me]);
+    if (mine) find_ambient_geometry(sky_shares[me]);
     for (int k = 0; k < lengths; k++) arrives[k] = on(transport) ? medium[k].w : 0.0;
     if (on(scattering_term) && !on(has_medium)) {
         if (mine) encode_scattering(0.0, arrives);
