@@ -1300,11 +1300,6 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__MAP_STEPS 3 /* levels of transmittance below which a light's map says where it falls */
 #define SSDGS__LANE_SUMS (6 + 12 * SSDGS_ASG_COUNT)
 #define SSDGS__GRAZING ((ssdgs_real)0.25) /* wo.h of deferred highlights at least */
-#define SSDGS__LAYERS \
-    8 /* blended in one walk: the colour and, deferred, Q (2), depth with F0, normal, three of one light */
-#define SSDGS__LIGHT_LAYER 5 /* the first light's: M, D, residual of S; the next light's follow */
-#define SSDGS__PER_LIGHT 3
-#define SSDGS__DEPTH_LAYER 3
 #define SSDGS__TILE_FOURTH \
     48 /* where in a micro-tile's 64 values the last 16 are: transmittance, or the gradients' product */
 #define SSDGS__TILE_LAYER 1024 /* values of a layer in a tile: [micro-tile][3 values, one more][16 lanes] */
@@ -1318,6 +1313,19 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__STEEP 1
 #define SSDGS__BACK 0.02
 #define SSDGS__FAR_BACK 0.06
+
+/* Layers of three values that pixels blend: the colour and, where light is deferred, what lights it. */
+enum {
+    SSDGS__COLOUR_LAYER,
+    SSDGS__Q_LAYER,         /* the lobe's Q: six values, two layers */
+    SSDGS__DEPTH_LAYER = 3, /* depth, F0, 1: the last blends to the cover */
+    SSDGS__NORMAL_LAYER,
+    SSDGS__LIGHT_LAYER, /* the first light's, others follow: the specular term without its lobes */
+    SSDGS__DIFFUSE_LAYER,
+    SSDGS__SHADOW_LAYER, /* the shadow network's output, v, how soft the shadow is */
+    SSDGS__LAYERS,       /* blended in one walk */
+    SSDGS__PER_LIGHT = SSDGS__LAYERS - SSDGS__LIGHT_LAYER
+};
 
 /* Rows of a block's geometry */
 enum {
@@ -6021,7 +6029,7 @@ static void ssdgs__shadow_keep(const ssdgs__shade_job *job, int light, const siz
 }
 
 static ssdgs_real *ssdgs__layer(const ssdgs_frame *frame, int layer) {
-    return frame->layers + (size_t)layer * 4 * (size_t)frame->count;
+    return layer ? frame->layers + (size_t)(layer - 1) * 4 * (size_t)frame->count : frame->color;
 }
 
 /* Rows of a block into a layer. */
@@ -6332,7 +6340,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         const ssdgs__lighting *lighting = ssdgs__lightings(frame, o) + light;
         ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0),
                    *shadow = NULL, *scattering = NULL;
-        const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
+        const int layer = SSDGS__PER_LIGHT * light; /* behind those of the first */
         const ssdgs_light *source = frame->lights + light;
         const int off = ssdgs__out_of_reach(frame, light, o);
         const int limited = ssdgs__limited(source), casts = ssdgs__casts(source);
@@ -6341,9 +6349,10 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         if (lit && limited) lit = ssdgs__reach_row(frame, o, light, gauss, reach, NULL) || frame->training;
         for (int s = 0; frame->layer_count && !(lit && lighting->deferred) && s < live; s++) {
             for (int i = 0; i < SSDGS__PER_LIGHT; i++)
-                memset(ssdgs__layer(frame, layer + i) + 4 * at[s], 0, 3 * sizeof(ssdgs_real));
+                memset(ssdgs__layer(frame, SSDGS__LIGHT_LAYER + layer + i) + 4 * at[s], 0,
+                       3 * sizeof(ssdgs_real));
             if (!lighting->deferred) continue;
-            ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
+            ssdgs_real *to = ssdgs__layer(frame, SSDGS__SHADOW_LAYER + layer) + 4 * at[s];
             to[1] = 1; /* or what blends with it would be darker */
             to[2] = scratch[l->lobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + (size_t)s];
         }
@@ -6393,11 +6402,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             ssdgs__medium_rows(lighting, o->medium, gauss, part + l->rows, part + l->transport, outs);
         if (lighting->deferred) {
             if (edited) ssdgs__edit_rows(factors, 6, outs);
-            ssdgs__layer_store(frame, layer, at, live, outs + SSDGS__OUT_SPECULAR * SSDGS__BLOCK);
-            ssdgs__layer_store(frame, layer + 1, at, live, outs);
+            ssdgs__layer_store(frame, SSDGS__LIGHT_LAYER + layer, at, live,
+                               outs + SSDGS__OUT_SPECULAR * SSDGS__BLOCK);
+            ssdgs__layer_store(frame, SSDGS__DIFFUSE_LAYER + layer, at, live, outs);
             memset(outs, 0, SSDGS__OUT_SCATTERING * SSDGS__BLOCK * sizeof *outs);
             for (int s = 0; s < live; s++) {
-                ssdgs_real *to = ssdgs__layer(frame, layer + 2) + 4 * at[s];
+                ssdgs_real *to = ssdgs__layer(frame, SSDGS__SHADOW_LAYER + layer) + 4 * at[s];
                 to[0] = shadow ? shadow[s] : 0;
                 to[1] = part[l->visibility + (size_t)s];
                 to[2] = scratch[l->lobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + (size_t)s];
@@ -6411,9 +6421,10 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     if (edited) ssdgs__edit_rows(factors, 9, outs);
     if (frame->layer_count) {
         for (int i = 0; i < 3; i++)
-            ssdgs__layer_store(frame, i < 2 ? i : 3, at, live, scratch + l->lobe + 3 * i * SSDGS__BLOCK);
+            ssdgs__layer_store(frame, i < 2 ? SSDGS__Q_LAYER + i : SSDGS__NORMAL_LAYER, at, live,
+                               scratch + l->lobe + 3 * i * SSDGS__BLOCK);
         for (int s = 0; s < live; s++) {
-            ssdgs_real *to = ssdgs__layer(frame, 2) + 4 * at[s];
+            ssdgs_real *to = ssdgs__layer(frame, SSDGS__DEPTH_LAYER) + 4 * at[s];
             to[0] = frame->views[0].depth[at[s]];
             to[1] = scratch[l->lobe + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK + (size_t)s];
             to[2] = 1;
@@ -6427,13 +6438,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             color[c] = to[c * SSDGS__BLOCK] + to[(SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK] +
                        to[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
-            for (int i = 0; i < frame->layer_count;
-                 i++) { /* whose products with the lobes must be finite as well */
+            for (int i = 1; i <= frame->layer_count; i++) { /* their products with lobes must be finite too */
                 const ssdgs_real value = ssdgs__layer(frame, i)[4 * g + (size_t)c];
                 black |= !(value <= (ssdgs_real)1e30 && value >= (ssdgs_real)-1e30);
             }
         }
-        for (int i = 0; i < frame->layer_count && black; i++)
+        for (int i = 1; i <= frame->layer_count && black; i++)
             memset(ssdgs__layer(frame, i) + 4 * g, 0, 4 * sizeof(ssdgs_real));
         for (int c = 0; c < SSDGS__OUTS && black; c++)
             color[c % 3] = to[c * SSDGS__BLOCK] = 0; /* or it spoils other pixels */
@@ -6473,7 +6483,7 @@ static void ssdgs__shade_skipped(const ssdgs__shade_job *job, int block) {
         if (frame->seen[g] != SSDGS_SKIPPED) continue;
         for (int p = 0; p < (frame->diffuse ? 6 : 1); p++)
             memcpy(planes[p] + 4 * g, planes[p] + 4 * from, 4 * sizeof(ssdgs_real));
-        for (int p = 0; p < frame->layer_count; p++)
+        for (int p = 1; p <= frame->layer_count; p++)
             memcpy(ssdgs__layer(frame, p) + 4 * g, ssdgs__layer(frame, p) + 4 * from, 4 * sizeof(ssdgs_real));
     }
 }
@@ -6569,7 +6579,8 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
 }
 
 static ssdgs_real *ssdgs__layer_gradient(const ssdgs_frame *frame, int layer) {
-    return frame->layer_gradient + (size_t)layer * 4 * (size_t)frame->count;
+    return layer ? frame->layer_gradient + (size_t)(layer - 1) * 4 * (size_t)frame->count
+                 : frame->color_gradient;
 }
 
 /* (n, 4) of the Gaussians `at` -> rows (3, BLOCK), 0 where none is. */
@@ -6635,10 +6646,11 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     ssdgs__gradient_rows(frame->color_gradient, at, live, dcolor);
     if (frame->layer_count) {
         for (int c = 0; c < 3; c++)
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, c < 2 ? c : 3), at, live,
-                                 dlobe + 3 * c * SSDGS__BLOCK);
+            ssdgs__gradient_rows(
+                ssdgs__layer_gradient(frame, c < 2 ? SSDGS__Q_LAYER + c : SSDGS__NORMAL_LAYER), at, live,
+                dlobe + 3 * c * SSDGS__BLOCK);
         ssdgs_real rows[3 * SSDGS__BLOCK];
-        ssdgs__gradient_rows(ssdgs__layer_gradient(frame, 2), at, live, rows);
+        ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__DEPTH_LAYER), at, live, rows);
         memcpy(dlobe + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK, rows + SSDGS__BLOCK,
                SSDGS__BLOCK * sizeof *rows); /* depth is the projection's */
         memset(dlobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK, 0,
@@ -6665,10 +6677,13 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         if (even) ssdgs__ambient_backward(frame, &lamp, &in, dcolor, lane_sums);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
         if (deferred) {
-            const int layer = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * light;
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer), at, live, dspecular);
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 1), at, live, ddiffuse);
-            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, layer + 2), at, live, dresidual);
+            const int layer = SSDGS__PER_LIGHT * light; /* behind those of the first */
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__LIGHT_LAYER + layer), at, live,
+                                 dspecular);
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__DIFFUSE_LAYER + layer), at, live,
+                                 ddiffuse);
+            ssdgs__gradient_rows(ssdgs__layer_gradient(frame, SSDGS__SHADOW_LAYER + layer), at, live,
+                                 dresidual);
             for (int s = 0; s < SSDGS__BLOCK; s++)
                 dlobe[SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
@@ -6954,9 +6969,8 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
         ssdgs__place_of_pixel(k, tile, i, depth[0] / depth[32], ray, at);
         const ssdgs_real passed = ssdgs__light_transmittance(frame, light, at, NULL);
-        visibility[lane] = passed < 0
-                               ? layers[(SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16] / depth[32]
-                               : passed;
+        visibility[lane] =
+            passed < 0 ? layers[SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + lane + 16] / depth[32] : passed;
         if (!frame->occluder || passed < 0) continue; /* the Gaussians' has it already */
         memcpy(points + 3 * points_count, at, sizeof at);
         fraction[points_count] = 1;
@@ -6988,8 +7002,8 @@ static void ssdgs__join_shadows(const ssdgs_frame *frame, const ssdgs__tile *til
     ssdgs__tile_load(tile, frame->pixel_shadow + plane, 1, before);
     ssdgs__tile_load(tile, ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 2), 2, before);
     for (int c = 0; c < 3; c++)
-        ssdgs__tile_load(
-            tile, ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c), c, others);
+        ssdgs__tile_load(tile, ssdgs__layer_plane(frame, SSDGS__DIFFUSE_LAYER + SSDGS__PER_LIGHT * light, c),
+                         c, others);
     for (int i = 0; i < 256; i++) {
         const int at = ssdgs__tile_lane(i);
         const ssdgs_real cover = depth[at + 32], all = before[at + 32]; /* has this one's cover already */
@@ -7017,7 +7031,7 @@ static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile,
     if (!empty) {
         const ssdgs_real *color[SSDGS__PER_LIGHT];
         for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
-            color[layer] = ssdgs__layer(frame, first - 1 + layer);
+            color[layer] = ssdgs__layer(frame, first + layer);
         if (light) k->composite(tile, SSDGS__PER_LIGHT, color, lit); /* the first's came with the others */
         if (frame->visibility_given) ssdgs__tile_load(tile, frame->pixel_visibility + plane, 0, visibility);
         else ssdgs__pixel_visibility(frame, lighting, light, tile, pixels, visibility);
@@ -7026,9 +7040,10 @@ static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile,
     if (!frame->layer_pixels) return;
     if (later)
         ssdgs__join_shadows(frame, tile, light, pixels + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
-                            lit + SSDGS__TILE_LAYER, visibility);
+                            pixels + SSDGS__DIFFUSE_LAYER * SSDGS__TILE_LAYER, visibility);
     for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
-        ssdgs__layer_pixels_store(frame, tile, first + layer, later && layer != 1,
+        ssdgs__layer_pixels_store(frame, tile, first + layer,
+                                  later && first + layer != SSDGS__DIFFUSE_LAYER + SSDGS__PER_LIGHT * light,
                                   lit + layer * SSDGS__TILE_LAYER);
     const int given = frame->visibility_given != 0;
     ssdgs_real *planes[2];
@@ -7064,7 +7079,7 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs_real *color[SSDGS__LAYERS];
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int layer = 0; layer < layers; layer++)
-        color[layer] = layer ? ssdgs__layer(frame, layer - 1) : job->color;
+        color[layer] = layer ? ssdgs__layer(frame, layer) : job->color;
     ssdgs_real scene_depth[256], median[256];
     ssdgs__tile_scene_depth(frame, &tile, scene_depth);
     if (job->color == frame->color && frame->median_depth) {
@@ -7136,7 +7151,7 @@ static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradie
 static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
                                   const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
                                   ssdgs_real *sums) {
-    const ssdgs_real *dv = gradient + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
+    const ssdgs_real *dv = gradient + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
     for (int i = 0; i < 256; i++) {
         const int lane = ssdgs__tile_lane(i), layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
         const ssdgs_real cover = pixels[layer + 32];
@@ -7145,7 +7160,7 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
         const ssdgs_real z = pixels[layer] / cover;
         ssdgs__place_of_pixel(k, tile, i, z, ray, at);
         if (ssdgs__light_transmittance(frame, light, at, slope) < 0) { /* it is the Gaussians' */
-            const int own = (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER + lane + 16;
+            const int own = SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + lane + 16;
             gradient[own] += dv[lane] / cover;
             gradient[layer + 32] -= dv[lane] * pixels[own] / (cover * cover);
             continue;
@@ -7208,14 +7223,13 @@ static void ssdgs__composite_backward_task(void *data, int index) {
         if (!light) continue; /* its layers are walked below */
         for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++) {
             const int at = lit + layer * SSDGS__TILE_LAYER;
-            *color = ssdgs__layer(frame, first - 1 + layer);
+            *color = ssdgs__layer(frame, first + layer);
             ssdgs__gradient_product(pixels + at, gradient + at, 1, 0);
             k->composite_backward(&tile, 1, color, gradient + at, pixels + at, sums, job->stride,
                                   first + layer);
         }
     }
-    for (int layer = 0; layer < layers; layer++)
-        color[layer] = layer ? ssdgs__layer(frame, layer - 1) : frame->color;
+    for (int layer = 0; layer < layers; layer++) color[layer] = ssdgs__layer(frame, layer);
     ssdgs__gradient_product(pixels, gradient, layers, 1);
     k->composite_backward(&tile, layers, color, gradient, pixels, sums, job->stride, 0);
 }
@@ -7240,8 +7254,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
             if (!v->tile_seen[place]) continue;
             for (int i = 0; i < 8; i++) sum[i] += from[i];
             for (int layer = 0; layer <= frame->layer_count; layer++) {
-                ssdgs_real *to =
-                    (layer ? ssdgs__layer_gradient(frame, layer - 1) : frame->color_gradient) + 4 * g;
+                ssdgs_real *to = ssdgs__layer_gradient(frame, layer) + 4 * g;
                 for (int i = 0; i < 3; i++) to[i] += from[8 + 4 * layer + i];
             }
         }
@@ -7251,7 +7264,7 @@ static void ssdgs__splat_gradient_task(void *data, int index) {
         for (int i = 2; i < 5; i++) d[i] = two_ln2 * sum[i + 1];
         d[5] = sum[0];
         d[6] = sum[6];
-        d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, SSDGS__DEPTH_LAYER - 1)[4 * g] : 0;
+        d[7] = frame->layer_count ? ssdgs__layer_gradient(frame, SSDGS__DEPTH_LAYER)[4 * g] : 0;
     }
 }
 
@@ -7474,7 +7487,7 @@ static void ssdgs__deferred_component(const ssdgs_frame *frame, int component, s
         for (int light = 0; light < frame->light_count; light++) {
             const ssdgs_real *shadow = frame->pixel_shadow + pixels * (size_t)light;
             const ssdgs_real *d =
-                ssdgs__layer_plane(frame, SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light + 1, c);
+                ssdgs__layer_plane(frame, SSDGS__DIFFUSE_LAYER + SSDGS__PER_LIGHT * light, c);
             for (size_t i = 0; i < pixels && component < 2; i++)
                 to[i] += (component ? -d[i] : d[i]) * shadow[i];
             for (size_t i = 0; i < pixels && component == 4 && c == 0; i++)
@@ -13611,8 +13624,9 @@ typedef struct F(highlight_geometry) {
 
 SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdgs__lighting *k,
                                            const V pixel[2], const R *layers) {
-    const R *q = layers + SSDGS__TILE_LAYER, *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
-            *normal = more + SSDGS__TILE_LAYER;
+    const R *q = layers + SSDGS__Q_LAYER * SSDGS__TILE_LAYER,
+            *more = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
+            *normal = layers + SSDGS__NORMAL_LAYER * SSDGS__TILE_LAYER;
     g->inverse_cover = V_DIV(V_SET(1), V_MAX(V_LOAD(more + 32), V_SET(SSDGS__THIN)));
     g->depth = V_MUL(V_LOAD(more), g->inverse_cover);
     g->f0 = V_MUL(V_LOAD(more + 16), g->inverse_cover);
@@ -13705,7 +13719,7 @@ typedef struct F(arrival) {
 } F(arrival);
 
 SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const R *layers, V map) {
-    const R *more = layers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
+    const R *more = layers + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER;
     a->inverse_cover = V_DIV(
         V_SET(1), V_MAX(V_LOAD(layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 32), V_SET(SSDGS__THIN)));
     a->residual = V_MUL(V_LOAD(more), a->inverse_cover);
@@ -13719,7 +13733,7 @@ SSDGS__FI void F(arrival_lanes)(F(arrival) * a, const ssdgs__lighting *k, const 
 /* Writes the gradient of the layer with the residual and, as its fourth, dL/dv of the map's v; returns
    -A dL/dA, A the cover. */
 SSDGS__FI V F(arrival_backward)(const F(arrival) * a, const ssdgs__lighting *k, V dfactor, R *dlayers) {
-    R *dmore = dlayers + (SSDGS__LIGHT_LAYER + 2) * SSDGS__TILE_LAYER;
+    R *dmore = dlayers + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER;
     V dvisibility = dfactor;
     const V dresidual = F(shadow_factor_backward)(k, a->visibility, a->factor, &dvisibility);
     const V dgauss = V_MUL(dvisibility, a->soft), dsoft = V_MUL(dvisibility, V_SUB(a->gauss, a->map));
@@ -13735,17 +13749,17 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
     for (int micro = 0; micro < 16; micro++) {
         V px[SSDGS__NV], py[SSDGS__NV];
         R *at = layers + micro * 64, *m = at + SSDGS__LIGHT_LAYER * SSDGS__TILE_LAYER,
-          *s = visibility + micro * 64;
+          *diffuse = at + SSDGS__DIFFUSE_LAYER * SSDGS__TILE_LAYER, *s = visibility + micro * 64;
         F(pixel_centres)(tile, micro, px, py);
-        for (int v = 0; v < SSDGS__NV; v++, at += SSDGS__VW, m += SSDGS__VW, s += SSDGS__VW) {
+        for (int v = 0; v < SSDGS__NV;
+             v++, at += SSDGS__VW, m += SSDGS__VW, diffuse += SSDGS__VW, s += SSDGS__VW) {
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
             F(arrival_lanes)(&arrival, k, at, V_LOAD(s));
             const V factor = arrival.factor;
             V_STORE(s + 16, factor);
             for (int c = 0; c < 3; c++)
-                V_STORE(at + 16 * c,
-                        V_FMA(factor, V_LOAD(m + SSDGS__TILE_LAYER + 16 * c), V_LOAD(at + 16 * c)));
+                V_STORE(at + 16 * c, V_FMA(factor, V_LOAD(diffuse + 16 * c), V_LOAD(at + 16 * c)));
             if (!V_BITS(V_LT(V_SET(0), V_MAX(V_MAX(V_LOAD(m), V_LOAD(m + 16)), V_LOAD(m + 32))))) continue;
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
@@ -13777,7 +13791,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             const V pixel[2] = {px[v], py[v]};
             F(arrival) arrival;
             V push = V_SET(0), dfactor = V_SET(0);
-            R *dlayer = d + SSDGS__TILE_LAYER;
+            R *d_q = d + SSDGS__Q_LAYER * SSDGS__TILE_LAYER;
             F(arrival_lanes)(&arrival, k, at, V_LOAD(s));
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
@@ -13787,11 +13801,12 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             for (int i = 0; i < 3; i++) {
                 const V pull = V_MUL(V_LOAD(d + 16 * i), arrival.factor);
                 V_STORE(dm + 16 * i, V_MUL(pull, value));
-                V_STORE(dm + SSDGS__TILE_LAYER + 16 * i, pull);
+                V_STORE(d + SSDGS__DIFFUSE_LAYER * SSDGS__TILE_LAYER + 16 * i, pull);
                 push = V_FMA(pull, V_LOAD(m + 16 * i), push);
-                dfactor =
-                    V_FMA(V_LOAD(d + 16 * i),
-                          V_FMA(value, V_LOAD(m + 16 * i), V_LOAD(m + SSDGS__TILE_LAYER + 16 * i)), dfactor);
+                dfactor = V_FMA(V_LOAD(d + 16 * i),
+                                V_FMA(value, V_LOAD(m + 16 * i),
+                                      V_LOAD(at + SSDGS__DIFFUSE_LAYER * SSDGS__TILE_LAYER + 16 * i)),
+                                dfactor);
             }
             V dcover = F(arrival_backward)(&arrival, k, dfactor, d);
             push = V_SEL(g.half, push, V_SET(0));
@@ -13824,12 +13839,11 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             const V dcosine = V_SEL(V_LT(V_SET(0), g.cosine),
                                     V_MUL(dmicrofacet, V_MUL(g.inverse_woh, g.inverse_woh)), V_SET(0));
             for (int j = 0; j < 2; j++) {
-                const V dlayer_q = V_MUL(dq[j], g.inverse_cover);
+                const V scale = V_MUL(dq[j], g.inverse_cover);
                 for (int i = 0; i < 3; i++) {
-                    const V twice = V_MUL(V_MUL(V_SET(2), dlayer_q), g.p[j][i]);
-                    R *cross = dlayer + SSDGS__TILE_LAYER + 16 * i;
-                    V_STORE(dlayer + 16 * i,
-                            V_FMA(V_MUL(dlayer_q, g.p[j][i]), g.p[j][i], V_LOAD(dlayer + 16 * i)));
+                    const V twice = V_MUL(V_MUL(V_SET(2), scale), g.p[j][i]);
+                    R *cross = d_q + SSDGS__TILE_LAYER + 16 * i;
+                    V_STORE(d_q + 16 * i, V_FMA(V_MUL(scale, g.p[j][i]), g.p[j][i], V_LOAD(d_q + 16 * i)));
                     V_STORE(cross, V_FMA(twice, g.p[j][(i + 1) % 3], V_LOAD(cross)));
                 }
             }
@@ -13845,7 +13859,7 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
             }
             const V dn_along = V_DOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
             for (int i = 0; i < 3; i++) {
-                R *out = dlayer + 3 * SSDGS__TILE_LAYER + 16 * i;
+                R *out = d + SSDGS__NORMAL_LAYER * SSDGS__TILE_LAYER + 16 * i;
                 V_STORE(out, V_FMA(V_FNMA(g.n[i], dn_along, dn[i]), g.inverse_n, V_LOAD(out)));
             }
             const V along_h = V_DOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
@@ -13872,13 +13886,13 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                 sum[9 + i][v] = V_FMA(dray, g.to_camera[1], sum[9 + i][v]);
                 sum[12 + i][v] = V_ADD(dray, sum[12 + i][v]);
             }
-            dlayer += 2 * SSDGS__TILE_LAYER;
-            V_STORE(dlayer, V_FMA(ddepth, g.inverse_cover, V_LOAD(dlayer)));
-            V_STORE(dlayer + 16, V_FMA(df0, g.inverse_cover, V_LOAD(dlayer + 16)));
+            R *ddepth_layer = d + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER;
+            V_STORE(ddepth_layer, V_FMA(ddepth, g.inverse_cover, V_LOAD(ddepth_layer)));
+            V_STORE(ddepth_layer + 16, V_FMA(df0, g.inverse_cover, V_LOAD(ddepth_layer + 16)));
             /* -A dL/dA: all are divided by A */
             dcover =
                 V_FMA(dq[0], g.q[0], V_FMA(dq[1], g.q[1], V_FMA(ddepth, g.depth, V_FMA(df0, g.f0, dcover))));
-            V_STORE(dlayer + 32, V_FNMA(dcover, g.inverse_cover, V_LOAD(dlayer + 32)));
+            V_STORE(ddepth_layer + 32, V_FNMA(dcover, g.inverse_cover, V_LOAD(ddepth_layer + 32)));
         }
     }
     for (int i = 0; i < SSDGS__HIGHLIGHT_SUMS; i++) sums[i] += F(sum)(sum[i]);

@@ -1170,7 +1170,7 @@ static void test_no_map(void) {
     for (int i = 1; i < frame.view_count; i++) frame.views[i].light_map = NULL;
     CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
     for (int i = 0; i < 60 * 40; i++) {
-        const ssdgs_real *of_gaussians = ssdgs__layer_plane(&frame, SSDGS__LIGHT_LAYER + 2, 1) + i;
+        const ssdgs_real *of_gaussians = ssdgs__layer_plane(&frame, SSDGS__SHADOW_LAYER, 1) + i;
         const double cover = (double)ssdgs__layer_plane(&frame, SSDGS__DEPTH_LAYER, 2)[i],
                      want = (double)*of_gaussians / cover;
         if (!(cover > 0.1 && want < 0.9)) continue;
