@@ -322,12 +322,14 @@ typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
 
 /* What a model computes; stored in its file. 0 or 1 where nothing else is said. */
 typedef struct ssdgs_settings {
-    int version;  /* set by ssdgs_settings_default / _published */
-    int terms;    /* SSDGS_*_TERM mask: what the model has */
-    int baked;    /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
-    int transfer; /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
-    int dipole;   /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
-    int asg;      /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
+    int version;   /* set by ssdgs_settings_default / _published */
+    int terms;     /* SSDGS_*_TERM mask: what the model has */
+    int baked;     /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
+    int harmonics; /* degree, 0 .. 3, of the spherical harmonics by which a baked colour changes with the view
+                    */
+    int transfer;  /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
+    int dipole;    /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
+    int asg;       /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
     int per_channel_optics;   /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
     int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies */
     int transport;            /* 1: it also sees what true dipole transport brings from where light enters */
@@ -821,18 +823,21 @@ extern "C" {
 enum {
     SSDGS_POSITION = 0, SSDGS_ROTATION = 3, SSDGS_LOG_SCALE = 7, SSDGS_OPACITY = 10, SSDGS_DIFFUSE = 11,
     SSDGS_SPECULAR = 14, SSDGS_SCATTERING = 17, SSDGS_FRAME = 20, SSDGS_ASG_WEIGHT = 24, SSDGS_MATERIAL = 32,
-    SSDGS_CHANNELS = 38
+    SSDGS_CHANNELS = 38,
+    SSDGS_HARMONICS = 14 /* of baked models: there SSDGS_DIFFUSE has f_dc, and from here on lies f_rest, as in
+                            other programs' files: all of red first, then green, then blue */
 };
 /* clang-format on */
 
 /* The raw arrays, valid until the model changes. Call ssdgs_model_arrays() before each round of writing: it
    is how rendering knows that what it has cached is out of date. */
 typedef struct ssdgs_model_view {
-    int count;             /* Gaussians */
-    size_t stride;         /* reals from one plane to the next */
-    ssdgs_real *gaussians; /* (SSDGS_CHANNELS, stride): scale = exp, opacity = sigmoid, colours and weights =
-                              softplus; deferred, ssdgs_gaussian's specular is sqrt(lambda mu) times c_s */
-    ssdgs_real *asg_basis; /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
+    int count;                 /* Gaussians */
+    size_t stride;             /* reals from one plane to the next */
+    int channels;              /* planes: SSDGS_CHANNELS; baked: SSDGS_HARMONICS + 0, 9, 24 or 45 */
+    ssdgs_real *gaussians;     /* (channels, stride): scale = exp, opacity = sigmoid, colours and weights =
+                                  softplus; deferred, ssdgs_gaussian's specular is sqrt(lambda mu) times c_s */
+    ssdgs_real *asg_basis;     /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
     ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; deferred: log s, logit t */
     ssdgs_real *asg_sigma;     /* (SSDGS_ASG_COUNT) deferred: a before softplus; else unused */
     ssdgs_real *scattering;    /* per layer: (out, in) weights, row-major, then (out) biases */
@@ -1289,6 +1294,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__SHARE \
     ((ssdgs_real)0.03125) /* of max_error, the most that one splat may take: fringes would use it up */
 #define SSDGS__F0 0.04    /* Schlick */
+#define SSDGS__HARMONIC 0.28209479177387814 /* a baked colour is 0.5 + this x f_dc + what f_rest gives */
 #define SSDGS__F0_LOGIT -3.1780538303479458
 #define SSDGS__SHARPEST 12             /* |log lambda|, |log mu| of deferred lobes at most */
 #define SSDGS__THIN ((ssdgs_real)1e-6) /* alpha below which nothing is divided by it */
@@ -1473,6 +1479,8 @@ typedef struct ssdgs__adam_rate {
     T(void, transpose, (const ssdgs_real *rows, int count, size_t padded, size_t stride, ssdgs_real *out)) \
     T(void, row_sums, (ssdgs_real *sums, size_t stride, const ssdgs_real *rows, const uint16_t *list, \
         int count)) \
+    K(void, harmonics, (const ssdgs_real *position, const ssdgs_real *rows, int degree, \
+        const ssdgs_real *eye, ssdgs_real *out)) \
     K(void, encode, (ssdgs_real *out, const ssdgs_real *in, const ssdgs_real *origin, ssdgs_real scale, \
         int dims, int levels)) \
     T(void, encode_backward, (ssdgs_real *din, const ssdgs_real *dout, const ssdgs_real *out, \
@@ -1919,16 +1927,17 @@ static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer
                            count, size);
     if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
     ssdgs__release(context, buffer->memory);
+    if (buffer->bytes) bytes += bytes / 8; /* what grows once will again */
     buffer->bytes = 0;
-    buffer->memory = ssdgs__allocate(context, bytes + bytes / 8);
+    buffer->memory = ssdgs__allocate(context, bytes);
     if (!buffer->memory) return SSDGS_ERR_MEMORY;
-    buffer->bytes = bytes + bytes / 8;
+    buffer->bytes = bytes;
     return SSDGS_OK;
 }
 
 /* The same, but what is there stays. */
 static ssdgs_result ssdgs__grow(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
-    ssdgs__buffer grown = {NULL, 0};
+    ssdgs__buffer grown = {NULL, buffer->bytes};
     if (buffer->memory && ssdgs__times(count, size) <= buffer->bytes) return SSDGS_OK;
     const ssdgs_result result = ssdgs__reserve(context, &grown, count, size);
     if (!result && buffer->memory) memcpy(grown.memory, buffer->memory, buffer->bytes);
@@ -2392,8 +2401,9 @@ struct ssdgs_model {
                              follow */
     int references;       /* itself and its trainers: the last that goes frees it */
     int count;
-    size_t capacity;       /* plane stride, a multiple of SSDGS__BLOCK */
-    ssdgs_real *gaussians; /* (SSDGS_CHANNELS, capacity) */
+    size_t capacity; /* plane stride, a multiple of SSDGS__BLOCK */
+    int channels;
+    ssdgs_real *gaussians; /* (channels, capacity) */
     size_t global_count;
     ssdgs_real *globals;               /* the groups of ssdgs__global_groups, in order */
     struct ssdgs__frame_memory *frame; /* of its frames: what the last one found is there for the next */
@@ -2485,6 +2495,7 @@ static void ssdgs__global_groups(const ssdgs_settings *settings, size_t first[SS
     S(version, "version", 0, 'i', SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, SSDGS_VERSION, -1) \
     S(terms, "terms", 0, 'i', 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, -1) \
     S(baked, "baked", 0, 'i', 0, 1, 0, 0, -1) \
+    S(harmonics, "harmonics", 0, 'i', 0, 3, 0, 0, 0) \
     S(transfer, "transfer", 0, 'i', 0, SSDGS_TRANSFER_NONE, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE, -1) \
     S(dipole, "dipole", 0, 'i', 0, SSDGS_DIPOLE_PRINTED, 0, 0, -1) \
     S(asg, "asg", 0, 'i', 0, SSDGS_ASG_DEFERRED, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC, -1) \
@@ -2649,7 +2660,9 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
         if (n->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
         if (n->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
         if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
-        const double most = idle ? (double)FLT_MAX : n->high;
+        const double most = idle                                                        ? (double)FLT_MAX
+                            : n->at == offsetof(ssdgs_settings, harmonics) && !s->baked ? 0
+                                                                                        : n->high;
         const ssdgs_result result = ssdgs__number_check(context, "settings", n, s, idle ? -most : low, most);
         if (result) return result;
     }
@@ -2659,19 +2672,24 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     return SSDGS_OK;
 }
 
-/* Neutral values of one Gaussian: grey, opacity 0.1, everything else at the start of training. */
+/* Values of a baked colour's harmonics but for f_dc, of each channel. */
+static int ssdgs__harmonics(const ssdgs_settings *s) { return (s->harmonics + 1) * (s->harmonics + 1) - 1; }
+
+/* A neutral raw value: grey, opacity 0.1, everything else at the start of training. */
+static ssdgs_real ssdgs__neutral(int channel) {
+    if (channel == SSDGS_ROTATION || channel == SSDGS_FRAME || channel >= SSDGS_MATERIAL) return 1;
+    if (channel == SSDGS_OPACITY) return (ssdgs_real)-2.1972245773362196; /* logit 0.1 */
+    if (channel >= SSDGS_DIFFUSE && channel < SSDGS_FRAME) return (ssdgs_real)0.5;
+    return channel >= SSDGS_LOG_SCALE && channel < SSDGS_OPACITY ? (ssdgs_real)-4 : 0;
+}
+
+/* f_dc of an albedo's raw value. */
+static ssdgs_real ssdgs__to_dc(ssdgs_real raw) {
+    return (ssdgs_real)(((double)ssdgs__softplus_scalar(raw) - 0.5) / SSDGS__HARMONIC);
+}
+
 static void ssdgs__gaussian_reset(ssdgs_real *gaussians, size_t stride, size_t index) {
-    for (int i = 0; i < SSDGS_CHANNELS; i++) gaussians[(size_t)i * stride + index] = 0;
-    gaussians[SSDGS_ROTATION * stride + index] = gaussians[SSDGS_FRAME * stride + index] = 1;
-    gaussians[SSDGS_OPACITY * stride + index] = (ssdgs_real)-2.1972245773362196; /* logit 0.1 */
-    for (int i = 0; i < 3; i++) {
-        gaussians[(size_t)(SSDGS_LOG_SCALE + i) * stride + index] = (ssdgs_real)-4;
-        gaussians[(size_t)(SSDGS_DIFFUSE + i) * stride + index] =
-            gaussians[(size_t)(SSDGS_SPECULAR + i) * stride + index] =
-                gaussians[(size_t)(SSDGS_SCATTERING + i) * stride + index] = (ssdgs_real)0.5;
-    }
-    for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++)
-        gaussians[(size_t)(SSDGS_MATERIAL + i) * stride + index] = 1;
+    for (int i = 0; i < SSDGS_CHANNELS; i++) gaussians[(size_t)i * stride + index] = ssdgs__neutral(i);
 }
 
 /* Networks start as PyTorch's linear layers do (uniform within 1 / sqrt(inputs)); the residual shadow
@@ -2742,14 +2760,21 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
     size_t bytes;
-    if (!ssdgs__product_fits(model->capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes)) bytes = SIZE_MAX;
+    model->channels = s.baked ? SSDGS_HARMONICS + 3 * ssdgs__harmonics(&s) : SSDGS_CHANNELS;
+    if (!ssdgs__product_fits(model->capacity, (size_t)model->channels * sizeof(ssdgs_real), &bytes))
+        bytes = SIZE_MAX;
     if (model->globals) model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
     if (!model->gaussians) {
         ssdgs__model_drop(model);
         return SSDGS_ERR_MEMORY;
     }
     model->count = count;
-    for (int i = 0; i < count; i++) ssdgs__gaussian_reset(model->gaussians, model->capacity, (size_t)i);
+    for (int c = 0; c < model->channels; c++) {
+        const ssdgs_real value = !s.baked || c < SSDGS_DIFFUSE ? ssdgs__neutral(c)
+                                 : c < SSDGS_HARMONICS         ? ssdgs__to_dc(ssdgs__neutral(c))
+                                                               : 0;
+        for (size_t i = 0; i < (size_t)count; i++) model->gaussians[(size_t)c * model->capacity + i] = value;
+    }
     ssdgs__globals_reset(model, 1);
     *out = model;
     return SSDGS_OK;
@@ -2794,6 +2819,7 @@ static ssdgs_model_view ssdgs__model_view(const ssdgs_model *model) {
     ssdgs_model_view view;
     view.count = model->count;
     view.stride = model->capacity;
+    view.channels = model->channels;
     view.gaussians = model->gaussians;
     view.asg_basis = model->globals;
     view.asg_sharpness = model->globals + first[SSDGS__ASG_SHARPNESS];
@@ -3004,6 +3030,18 @@ SSDGS_API ssdgs_result ssdgs_gaussian_mirror(ssdgs_model *model, const ssdgs_rea
                  ssdgs__gaussian_mirror(model, roughness, gaussian));
 }
 
+/* A Gaussian's raw parameters; a baked one's colour as if it were an albedo, and neutral values behind. */
+static void ssdgs__gaussian_raw(const ssdgs_model *model, size_t index, ssdgs_real raw[SSDGS_CHANNELS]) {
+    const int baked = model->settings.baked;
+    ssdgs__gaussian_reset(raw, 1, 0);
+    for (int c = 0; c < (baked ? SSDGS_HARMONICS : SSDGS_CHANNELS); c++)
+        raw[c] = model->gaussians[(size_t)c * model->capacity + index];
+    for (int c = SSDGS_DIFFUSE; c < SSDGS_HARMONICS && baked; c++) {
+        const double color = 0.5 + SSDGS__HARMONIC * (double)raw[c];
+        raw[c] = (ssdgs_real)ssdgs__softplus_inverse(color > 0 ? color : 0);
+    }
+}
+
 static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *function, int index,
                                           const ssdgs_gaussian *gaussian) {
     if (!gaussian) return ssdgs__null(model->context, function, "gaussian");
@@ -3017,14 +3055,26 @@ SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdg
     ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_set");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_set", index, gaussian);
+    const int baked = model->settings.baked;
     const char *wrong = result ? NULL : ssdgs__gaussian_wrong(gaussian);
     if (wrong)
         result = ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
                              "ssdgs_model_set: the %s of Gaussian %d is out of range", wrong, index);
     if (!result) {
         ssdgs__model_changed(model);
-        ssdgs__gaussian_store(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, model->gaussians + index,
-                              model->capacity);
+        const int deferred = model->settings.asg == SSDGS_ASG_DEFERRED;
+        ssdgs_real raw[SSDGS_CHANNELS];
+        ssdgs_gaussian was;
+        ssdgs__gaussian_raw(model, (size_t)index, raw);
+        ssdgs__gaussian_load(&was, deferred, raw, 1);
+        ssdgs__gaussian_store(gaussian, deferred, raw, 1);
+        for (int c = 0; c < (baked ? SSDGS_HARMONICS : SSDGS_CHANNELS); c++) {
+            ssdgs_real *to = model->gaussians + (size_t)c * model->capacity + index;
+            const int color = baked && c >= SSDGS_DIFFUSE ? c - SSDGS_DIFFUSE : -1;
+            if (color < 0) *to = raw[c];
+            else if (memcmp(was.diffuse + color, gaussian->diffuse + color, sizeof *to))
+                *to = ssdgs__to_dc(raw[c]); /* else it stays, also below black */
+        }
     }
     return ssdgs__leave(model->context, result);
 }
@@ -3034,9 +3084,11 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
     ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_get");
     if (result) return result;
     result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
-    if (!result)
-        ssdgs__gaussian_load(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, model->gaussians + index,
-                             model->capacity);
+    ssdgs_real raw[SSDGS_CHANNELS];
+    if (!result) {
+        ssdgs__gaussian_raw(model, (size_t)index, raw);
+        ssdgs__gaussian_load(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, raw, 1);
+    }
     return ssdgs__leave(model->context, result);
 }
 
@@ -3087,9 +3139,9 @@ static void ssdgs__split(const ssdgs_real *position, size_t stride, uint64_t *ke
 }
 
 /* Reorders planes: place i gets what was at index keys[i]. scratch: count values. */
-static void ssdgs__arrange(ssdgs_real *planes, size_t stride, const uint64_t *keys, size_t count,
-                           ssdgs_real *scratch) {
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
+static void ssdgs__arrange(ssdgs_real *planes, int channels, size_t stride, const uint64_t *keys,
+                           size_t count, ssdgs_real *scratch) {
+    for (size_t c = 0; c < (size_t)channels; c++) {
         ssdgs_real *plane = planes + c * stride;
         for (size_t i = 0; i < count; i++) scratch[i] = plane[(uint32_t)keys[i]];
         memcpy(plane, scratch, count * sizeof *plane);
@@ -3103,7 +3155,8 @@ static ssdgs_result ssdgs__model_sort(ssdgs_model *model) {
     if (!keys) return SSDGS_ERR_MEMORY;
     for (size_t i = 0; i < count; i++) keys[i] = i;
     ssdgs__split(model->gaussians + SSDGS_POSITION * model->capacity, model->capacity, keys, count);
-    ssdgs__arrange(model->gaussians, model->capacity, keys, count, (ssdgs_real *)(keys + count));
+    ssdgs__arrange(model->gaussians, model->channels, model->capacity, keys, count,
+                   (ssdgs_real *)(keys + count));
     ssdgs__release(model->context, keys);
     ssdgs__model_changed(model);
     model->arrangement++;
@@ -3117,7 +3170,7 @@ SSDGS_API ssdgs_result ssdgs_model_sort(ssdgs_model *model) {
 /* Gaussians as a file of that version has them become today's: up to 0.2.0 c_s was a deferred lobe's height.
  */
 static void ssdgs__gaussians_update(ssdgs_model *model, int version) {
-    const int older = version <= 200 && model->settings.asg == SSDGS_ASG_DEFERRED;
+    const int older = version <= 200 && model->settings.asg == SSDGS_ASG_DEFERRED && !model->settings.baked;
     for (size_t i = 0; i < (size_t)model->count && older; i++) {
         ssdgs_gaussian g;
         ssdgs__gaussian_load(&g, 0, model->gaussians + i, model->capacity);
@@ -3172,8 +3225,8 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
 
 typedef struct ssdgs__view_memory {
     ssdgs__buffer light_map, map_tile; /* the view's own; the batches share the rest */
-    ssdgs__buffer record, depth, keys, order, box, instance, of_gaussian, of_rank, start, list, seen, needed,
-        sums, histogram;
+    ssdgs__buffer record, depth, keys, order, instance, of_gaussian, start, list, seen, needed, sums,
+        histogram; /* keys are the sort's, then boxes of Gaussians and instances of ranks, to bin them */
     uint64_t chunk_room[SSDGS__BIN_CHUNKS];
 } ssdgs__view_memory;
 
@@ -4628,7 +4681,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     memset(m->counts, 0, sizeof m->counts);
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
     SSDGS__KEEP(m->seen, frame->seen, unsigned char, n);
-    const size_t lit = ssdgs__times(n, (size_t)frame->light_count + 1);
+    const size_t lit = ssdgs__times(n, (size_t)frame->light_count);
     SSDGS__KEEP(m->visibility, frame->visibility, ssdgs_real, lit);
     int deferred = 0, cue = 0, transport = 0;
     for (int i = 0; i < frame->object_count; i++) {
@@ -4869,7 +4922,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
     for (; ssdgs__reached_next(frame, v->light, &begin, end, &stop); begin = stop)
         for (int g = begin; g < stop; g++) {
-            uint16_t *box = (uint16_t *)m->box.memory + 4 * (size_t)g;
+            uint16_t *box = (uint16_t *)m->keys.memory + 4 * (size_t)g;
             if (v->depth[g] >= 0) {
                 ssdgs__tile_box(v, v->record + g, box);
                 room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
@@ -4892,7 +4945,7 @@ static void ssdgs__bin_task(void *data, int index) {
     int begin, end, stop;
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
     for (; ssdgs__reached_next(frame, v->light, &begin, end, &stop); begin = stop)
-        number = frame->context->k->bin(v, (const uint16_t *)m->box.memory, ssdgs__log2_threshold(frame),
+        number = frame->context->k->bin(v, (const uint16_t *)m->keys.memory, ssdgs__log2_threshold(frame),
                                         begin, stop, number);
 }
 
@@ -4909,7 +4962,7 @@ static void ssdgs__bin_count_task(void *data, int index) {
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     const ssdgs_splat_view *v = frame->views + view;
-    ssdgs_instances *of_rank = (ssdgs_instances *)m->of_rank.memory;
+    ssdgs_instances *of_rank = (ssdgs_instances *)m->keys.memory + frame->count;
     if (v->cached) return;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
@@ -4950,7 +5003,7 @@ static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
-    const ssdgs_instances *of_rank = (const ssdgs_instances *)m->of_rank.memory;
+    const ssdgs_instances *of_rank = (const ssdgs_instances *)m->keys.memory + frame->count;
     const ssdgs_splat_view *v = frame->views + view;
     if (v->cached) return;
     uint32_t *place = ssdgs__histogram(frame, view, chunk);
@@ -4973,10 +5026,10 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     const size_t n = (size_t)frame->count;
     const int views = frame->batch[1] - frame->batch[0], tasks = views * SSDGS__BIN_CHUNKS;
     for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
-        uint16_t *box;
+        ssdgs_instances *work; /* a hook may have sorted */
         if (frame->views[i].cached) continue;
-        SSDGS__RESERVE(ssdgs__view_memory_of(frame, i)->box, box, uint16_t, 4 * n + 4);
-        (void)box;
+        SSDGS__RESERVE(ssdgs__view_memory_of(frame, i)->keys, work, ssdgs_instances, 2 * n + 1);
+        (void)work;
     }
     ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
     for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
@@ -4997,14 +5050,12 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
                                v->width, v->height);
         v->instance_room = (size_t)room;
         SSDGS__RESERVE(m->of_gaussian, v->of_gaussian, ssdgs_instances, n + 1);
-        ssdgs_instances *of_rank;
-        SSDGS__RESERVE(m->of_rank, of_rank, ssdgs_instances, v->visible + 1);
         SSDGS__RESERVE(m->instance, v->instance, ssdgs_instance, v->instance_room + 1);
         SSDGS__RESERVE(m->list, v->tile_list, ssdgs_tile_entry, v->instance_room + 1);
         SSDGS__RESERVE(m->start, v->tile_start, uint32_t, tiles + 1);
         uint32_t *histogram;
         SSDGS__RESERVE(m->histogram, histogram, uint32_t, tiles * SSDGS__BIN_CHUNKS);
-        (void)of_rank, (void)histogram;
+        (void)histogram;
     }
     ssdgs__parallel(context, tasks, ssdgs__bin_task, frame);
     ssdgs__parallel(context, tasks, ssdgs__bin_count_task, frame);
@@ -5686,7 +5737,7 @@ typedef struct ssdgs__block_layout {
         widest;
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                                    /* within the block */
-    size_t inputs, outs, lobe; /* scratch of both directions */
+    size_t inputs, outs, lobe, harmonics; /* scratch of both directions */
     size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility,
         scratch; /* and of the backward */
 } ssdgs__block_layout;
@@ -5720,7 +5771,8 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame, const ssdgs_p
                                                                 : 1); /* only the backward asks again */
     l.outs = b * (size_t)(l.widest + 1);
     l.lobe = l.outs + b * SSDGS__OUTS;
-    l.dgauss = l.lobe + b * SSDGS__LOBE;
+    l.harmonics = l.lobe + b * SSDGS__LOBE;
+    l.dgauss = l.harmonics + b * (o->settings.baked ? (size_t)(o->gaussians.channels - SSDGS_DIFFUSE) : 0);
     l.drows = l.dgauss + b * SSDGS_CHANNELS;
     l.dcolor = l.drows + b * SSDGS__ROWS;
     l.ddiffuse = l.dcolor + b * 3;
@@ -6271,7 +6323,8 @@ static int ssdgs__object_factors(const ssdgs_frame *frame, const ssdgs_placed *o
                                  const size_t at[SSDGS__BLOCK], ssdgs_real *gauss,
                                  ssdgs_real factors[4 * SSDGS__BLOCK]) {
     const ssdgs__lighting *k = ssdgs__lightings(frame, o) + frame->light_count;
-    const int rougher = (o->terms & SSDGS_SPECULAR_TERM) && (o->roughness < 1 || o->roughness > 1);
+    const int rougher =
+        (o->terms & SSDGS_SPECULAR_TERM) && !o->settings.baked && (o->roughness < 1 || o->roughness > 1);
     int edited = rougher || o->specular < 1 || o->specular > 1;
     for (int c = 0; c < 3; c++) edited |= o->tint[c] < 1 || o->tint[c] > 1;
     for (int s = 0; s < SSDGS__BLOCK && edited; s++) {
@@ -6302,14 +6355,19 @@ static void ssdgs__edit_rows(const ssdgs_real *factors, int rows, ssdgs_real *ou
 
 SSDGS__SMALL_END
 
-/* The colours of a plain splat file: as they are, or decoded where the frame blends linear light. */
-static void ssdgs__baked(const ssdgs_frame *frame, const ssdgs_placed *o, const ssdgs_real *gauss,
-                         ssdgs_real *outs) {
-    const int decode =
-        o->settings.transfer == SSDGS_TRANSFER_NONE && frame->settings.transfer == SSDGS_TRANSFER_SRGB;
-    for (int i = 0; i < 3 * SSDGS__BLOCK; i++)
-        outs[i] = ssdgs__softplus_scalar(gauss[SSDGS_DIFFUSE * SSDGS__BLOCK + i]);
-    if (decode) frame->context->k->srgb_decode(outs, outs, 3 * SSDGS__BLOCK);
+/* The colours of plain splats, as they are seen from the eye: stored values, decoded where the frame blends
+   linear light. */
+static void ssdgs__baked(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t at[SSDGS__BLOCK],
+                         const ssdgs_real *position, ssdgs_real *rows, ssdgs_real *outs) {
+    const ssdgs__kernels *k = frame->context->k;
+    for (int c = SSDGS_DIFFUSE; c < o->gaussians.channels; c++) {
+        const ssdgs_real *plane = o->gaussians.gaussians + (size_t)c * o->gaussians.stride;
+        for (int s = 0; s < SSDGS__BLOCK; s++) *rows++ = plane[at[s] - (size_t)o->first];
+    }
+    rows -= (o->gaussians.channels - SSDGS_DIFFUSE) * SSDGS__BLOCK;
+    k->harmonics(position, rows, o->settings.harmonics, ssdgs__lightings(frame, o)->eye, outs);
+    if (o->settings.transfer == SSDGS_TRANSFER_NONE && frame->settings.transfer == SSDGS_TRANSFER_SRGB)
+        k->srgb_decode(outs, outs, 3 * SSDGS__BLOCK);
 }
 
 static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
@@ -6324,9 +6382,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     const int live = job->block[block].live;
     size_t at[SSDGS__BLOCK];
     for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(job, block, s);
-    for (int i = 0; i < SSDGS_CHANNELS; i++) {
+    const int bare = settings->baked && !frame->layer_count && !frame->diffuse; /* needs a colour alone */
+    for (int i = 0; i < (bare ? SSDGS_ROTATION : SSDGS_CHANNELS); i++) {
         const ssdgs_real *plane = o->gaussians.gaussians + (size_t)i * o->gaussians.stride;
-        for (int s = 0; s < SSDGS__BLOCK; s++) gauss[i * SSDGS__BLOCK + s] = plane[at[s] - (size_t)o->first];
+        const int neutral = settings->baked && i >= SSDGS_ROTATION;
+        for (int s = 0; s < SSDGS__BLOCK; s++)
+            gauss[i * SSDGS__BLOCK + s] = neutral ? ssdgs__neutral(i) : plane[at[s] - (size_t)o->first];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     ssdgs_real factors[4 * SSDGS__BLOCK];
@@ -6417,7 +6478,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     if (o->sky_share)
         ssdgs__shade_ambient(frame, o, l, lists, at, edited ? factors + 3 * SSDGS__BLOCK : NULL, memory,
                              scratch);
-    if (settings->baked) ssdgs__baked(frame, o, gauss, outs);
+    if (settings->baked) ssdgs__baked(frame, o, at, gauss, scratch + l->harmonics, outs);
     if (edited) ssdgs__edit_rows(factors, 9, outs);
     if (frame->layer_count) {
         for (int i = 0; i < 3; i++)
@@ -8251,13 +8312,14 @@ static const char *const ssdgs__ply_kinds[SSDGS__PLY_KINDS] = {"vertex", "ssdgs_
                                                                "scattering_weight", "shadow_weight"};
 
 /* A row is an array of 32-bit words: floats, as bits, or the integers of the settings when they are written.
-   A vertex has the model's planes first, then what only other programs use; settings follow each other;
+   A vertex has a trained model's planes first, then what other programs use; settings follow each other;
    globals lie at 4 x group. */
 enum {
     SSDGS__PLY_NORMAL = SSDGS_CHANNELS,
     SSDGS__PLY_DC = SSDGS_CHANNELS + 3,
-    SSDGS__PLY_RGB = SSDGS_CHANNELS + 22, /* behind all that is written, settings too */
-    SSDGS__PLY_WORDS = SSDGS_CHANNELS + 25
+    SSDGS__PLY_REST = SSDGS__PLY_DC + 3,
+    SSDGS__PLY_RGB = SSDGS__PLY_REST + 45, /* behind all that is written, settings too */
+    SSDGS__PLY_WORDS = SSDGS__PLY_RGB + 3
 };
 
 typedef struct ssdgs__ply_field {
@@ -8284,6 +8346,7 @@ static const ssdgs__ply_field ssdgs__ply_fields[] = {
     SSDGS__V("ny", 0, SSDGS__PLY_NORMAL + 1),
     SSDGS__V("nz", 0, SSDGS__PLY_NORMAL + 2),
     SSDGS__V("f_dc_", 3, SSDGS__PLY_DC),
+    SSDGS__V("f_rest_", 45, SSDGS__PLY_REST),
     SSDGS__V("opacity", 0, SSDGS_OPACITY),
     SSDGS__V("scale_", 3, SSDGS_LOG_SCALE),
     SSDGS__V("rot_", 4, SSDGS_ROTATION),
@@ -8329,10 +8392,8 @@ static int ssdgs__ply_next(ssdgs__ply_cursor *cursor, int kind) {
 
 /* The name of the property, which it writes to name. */
 static const char *ssdgs__ply_name(const ssdgs__ply_cursor *cursor, char name[32]) {
-    const size_t length = strlen(cursor->field->stem);
-    memcpy(name, cursor->field->stem, length + 1);
-    if (cursor->field->count) name[length] = (char)('0' + cursor->index), name[length + 1] = 0;
-    return name;
+    if (cursor->field->count) snprintf(name, 32, "%s%d", cursor->field->stem, cursor->index);
+    return cursor->field->count ? name : cursor->field->stem;
 }
 
 /* Where in ssdgs_settings a setting lies: an int or a ssdgs_real. */
@@ -8380,8 +8441,6 @@ static double ssdgs__ply_value(uint32_t bits) {
 
 static int ssdgs__ply_finite(uint32_t bits) { return (bits & 0x7f800000u) != 0x7f800000u; }
 
-#define SSDGS__PLY_HARMONIC 0.28209479177387814 /* colour = 0.5 + this x f_dc */
-
 /* ---- reading ---- */
 
 /* Limits of a header */
@@ -8419,10 +8478,10 @@ typedef struct ssdgs__ply_property {
 typedef struct ssdgs__ply_element {
     ssdgs__ply_token name;
     size_t count;
-    int kind;              /* -1 = skipped */
-    int first, properties; /* in ssdgs__ply.properties */
-    int lists;             /* 1: some are lists */
-    uint64_t present;      /* words that the properties give */
+    int kind;                                /* -1 = skipped */
+    int first, properties;                   /* in ssdgs__ply.properties */
+    int lists;                               /* 1: some are lists */
+    unsigned char present[SSDGS__PLY_WORDS]; /* 1: a property gives this word */
     const unsigned char *data;
 } ssdgs__ply_element;
 
@@ -8435,6 +8494,7 @@ typedef struct ssdgs__ply {
     double color_unit[3]; /* of red, green and blue: by their types */
     ssdgs__ply_format format;
     int newline, line, element_count, property_count;
+    int harmonics, interleaved; /* of f_rest: values of each channel; 1: red, green and blue lie together */
     ssdgs__ply_element elements[SSDGS__PLY_MAX_ELEMENTS], *known[SSDGS__PLY_KINDS];
     ssdgs__ply_property properties[SSDGS__PLY_MAX_PROPERTIES];
     const ssdgs__ply_property *bad; /* where a row is broken, and how */
@@ -8601,7 +8661,7 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
                                                                                                   : 1;
         }
         property->word = cursor.word;
-        element->present |= (uint64_t)1 << cursor.word;
+        element->present[cursor.word] = 1;
     }
     element->lists |= list;
     element->properties++;
@@ -8648,6 +8708,13 @@ static int ssdgs__ply_scalar(ssdgs__ply *ply, int type, double origin, uint32_t 
     const int size = ssdgs__ply_sizes[type], moved = origin < 0 || origin > 0;
     uint64_t raw = 0;
     double value;
+    if (type == SSDGS__PLY_FLOAT32 && ply->format == SSDGS__PLY_LITTLE && bits && !moved &&
+        ply->end - ply->at >= 4) { /* what nearly all are */
+        *bits = (uint32_t)ply->at[0] | (uint32_t)ply->at[1] << 8 | (uint32_t)ply->at[2] << 16 |
+                (uint32_t)ply->at[3] << 24;
+        ply->at += 4;
+        return 1;
+    }
     if (ply->format == SSDGS__PLY_ASCII) {
         const ssdgs__ply_token token = ssdgs__ply_cut(&ply->at, ply->end);
         if (count || !bits) return count ? ssdgs__ply_count(token, count) : token.length > 0;
@@ -8739,11 +8806,11 @@ static ssdgs_result ssdgs__ply_require(const ssdgs__ply *ply, int kind, int firs
     char name[32];
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         if (cursor.word >= first && cursor.word < last && cursor.field->before < 0 &&
-            !(ply->known[kind]->present >> cursor.word & 1))
+            !ply->known[kind]->present[cursor.word])
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s lacks property %s%s",
                                ply->name, ssdgs__ply_kinds[kind], ssdgs__ply_name(&cursor, name),
                                kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS_ROTATION &&
-                                       !(ply->known[kind]->present >> SSDGS_ROTATION & 255)
+                                       !memchr(ply->known[kind]->present + SSDGS_ROTATION, 1, 8)
                                    ? ": these are no Gaussian splats, but a point cloud or a mesh"
                                    : "");
     }
@@ -8789,14 +8856,6 @@ static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *se
     return ssdgs__settings_of_file(ply->context, ply->name, settings);
 }
 
-/* The raw colour of a plain file: softplus(raw) = max(0, colour), kept off minus infinity. */
-static uint32_t ssdgs__ply_plain_color(uint32_t bits, int dc, double unit) {
-    if (!ssdgs__ply_finite(bits)) return bits;
-    double color = dc ? 0.5 + SSDGS__PLY_HARMONIC * ssdgs__ply_value(bits) : ssdgs__ply_value(bits) / unit;
-    color = color < 1e-6 ? 1e-6 : color;
-    return ssdgs__ply_bits(color > 20 ? color : log(expm1(color)));
-}
-
 /* Makes a Gaussian fit for use; 0 = drop it. Without their sign, floats order as their bits do: finite,
    infinity, NaN. */
 static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats) {
@@ -8825,38 +8884,126 @@ static int ssdgs__ply_mend(uint32_t *words, int planes, ssdgs_load_stats *stats)
     return 1;
 }
 
+static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *element, const char *name) {
+    int i;
+    for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name);
+         i++) {}
+    return i < element->properties;
+}
+
+/* The degree of a plain file's harmonics that are not all 0. f_rest lies channel by channel, or coefficient
+   by coefficient, as some programs have written it. A file does not say which, but colours change with the
+   view more in brightness than in hue: what lies together as red, green and blue of a coefficient has a
+   larger sum of squares of its sums. */
+static int ssdgs__ply_harmonics(ssdgs__ply *ply) {
+    enum { ENOUGH = 20000 }; /* rows, to tell by */
+    const ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
+    unsigned char used[45];
+    double apart = 0, together = 0;
+    int all = 0, degree = 3, first_unused = 0;
+    while (all < 45 && vertex->present[SSDGS__PLY_REST + all]) all++;
+    if (!all) return 0;
+    while (degree && 3 * ((degree + 1) * (degree + 1) - 1) != all) degree--;
+    if (!degree || ssdgs__ply_has(ply, vertex, "f_rest_45")) {
+        ssdgs__note(ply->context, "%s: f_rest is left out: it is not of degree 1, 2 or 3", ply->name);
+        return 0;
+    }
+    memset(used, 0, sizeof used);
+    ply->at = vertex->data;
+    ply->harmonics = all / 3;
+    for (size_t row = 0; row < vertex->count && (row < ENOUGH || first_unused < all); row++) {
+        uint32_t words[SSDGS__PLY_WORDS], *rest = words + SSDGS__PLY_REST;
+        if (!ssdgs__ply_row(ply, vertex, words)) return 0; /* reading the rows reports it */
+        for (int i = 0; i < all; i++) used[i] |= (rest[i] & 0x7fffffffu) != 0;
+        while (first_unused < all && used[first_unused]) first_unused++;
+        for (int i = 0; i < ply->harmonics && row < ENOUGH; i++) {
+            double sum[2] = {0, 0};
+            for (int c = 0; c < 3; c++) {
+                sum[0] += ssdgs__ply_value(rest[i + c * ply->harmonics]);
+                sum[1] += ssdgs__ply_value(rest[3 * i + c]);
+            }
+            if (!(fabs(sum[0]) < 1e15 && fabs(sum[1]) < 1e15)) continue;
+            apart += sum[0] * sum[0];
+            together += sum[1] * sum[1];
+        }
+    }
+    ply->interleaved = together > 1.5 * apart;
+    if (ply->interleaved)
+        ssdgs__note(ply->context, "%s: f_rest is taken to lie coefficient by coefficient", ply->name);
+    for (int any = 0; degree; degree--) {
+        for (int i = 0; i < all; i++) {
+            const int at = ply->interleaved ? i / 3 : i % ply->harmonics;
+            any |= used[i] && at >= degree * degree - 1;
+        }
+        if (any) break;
+    }
+    return degree;
+}
+
+typedef struct ssdgs__ply_target { /* where a word of a row goes: to[row x step] */
+    ssdgs__ply_cursor cursor;
+    int word;
+    ssdgs_real *to;
+    size_t step;
+} ssdgs__ply_target;
+
 /* Fills the model's arrays from an element's rows. */
 static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model *model,
                                          ssdgs_load_stats *stats) {
     ssdgs__ply_element *element = ply->known[kind];
-    const int dc = (int)(element->present >> SSDGS__PLY_DC & 1),
-              plain = kind == SSDGS__PLY_VERTEX && stats->plain;
+    const int vertex = kind == SSDGS__PLY_VERTEX, baked = vertex && model->settings.baked;
+    const int planes = baked ? SSDGS_HARMONICS : SSDGS_CHANNELS;
+    const int albedo = baked && element->present[SSDGS_SPECULAR]; /* up to 0.2.5, f_dc was not in kd_ */
+    const int more = ssdgs__harmonics(&model->settings);
+    ssdgs__ply_target targets[SSDGS__PLY_WORDS], *target = targets;
+    ssdgs__ply_cursor cursor;
+    for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
+        const int at = cursor.word - SSDGS__PLY_REST, file = ply->harmonics;
+        const int c = ply->interleaved ? at % 3 : at / (file + !file),
+                  i = ply->interleaved ? at / 3 : at % (file + !file);
+        target->cursor = cursor;
+        target->word = cursor.word;
+        if (baked && at >= 0 && at < 3 * file && i < more) {
+            target->to = model->gaussians + (size_t)(SSDGS_HARMONICS + c * more + i) * model->capacity;
+        } else if (cursor.word < planes && (element->present[cursor.word] || (baked && stats->plain))) {
+            target->to = ssdgs__ply_cell(model, 0, &cursor);
+        } else continue;
+        target++->step = vertex ? 1 : (size_t)(cursor.field->count ? cursor.field->count : 1);
+    }
     size_t kept = 0;
     ply->at = element->data;
-    if (plain) element->present |= (uint64_t)7 << SSDGS_DIFFUSE;
     for (size_t row = 0; row < element->count; row++) {
         uint32_t words[SSDGS__PLY_WORDS];
         if (!ssdgs__ply_row(ply, element, words)) return ssdgs__ply_broken(ply, element, row);
-        for (int i = 0; i < 3 && plain; i++)
-            words[SSDGS_DIFFUSE + i] = ssdgs__ply_plain_color(
-                words[(dc ? SSDGS__PLY_DC : SSDGS__PLY_RGB) + i], dc, ply->color_unit[i]);
-        if (kind == SSDGS__PLY_VERTEX &&
-            !ssdgs__ply_mend(words, plain ? SSDGS_DIFFUSE + 3 : SSDGS_CHANNELS, stats))
-            continue;
-        ssdgs__ply_cursor cursor;
-        for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
-            if (!(element->present >> cursor.word & 1) || cursor.word >= SSDGS_CHANNELS) continue;
-            if (!ssdgs__ply_finite(words[cursor.word])) {
-                char name[32];
-                return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
-                                   "%s: element %s, row %z, property %s: it is not finite", ply->name,
-                                   ssdgs__ply_kinds[kind], row, ssdgs__ply_name(&cursor, name));
-            }
-            *ssdgs__ply_cell(model, kept, &cursor) = (ssdgs_real)ssdgs__ply_value(words[cursor.word]);
+        for (int i = 0; i < 3 && baked; i++) {
+            uint32_t *word = words + SSDGS_DIFFUSE + i;
+            if (stats->plain && element->present[SSDGS__PLY_DC]) *word = words[SSDGS__PLY_DC + i];
+            else if (stats->plain && ssdgs__ply_finite(words[SSDGS__PLY_RGB + i]))
+                *word =
+                    ssdgs__ply_bits((ssdgs__ply_value(words[SSDGS__PLY_RGB + i]) / ply->color_unit[i] - 0.5) /
+                                    SSDGS__HARMONIC);
+            else if (stats->plain) *word = words[SSDGS__PLY_RGB + i];
+            else if (albedo && ssdgs__ply_finite(*word))
+                *word = ssdgs__ply_bits((double)ssdgs__to_dc((ssdgs_real)ssdgs__ply_value(*word)));
         }
+        if (vertex && !ssdgs__ply_mend(words, planes, stats)) continue;
+        const ssdgs__ply_target *bad = targets;
+        while (bad < target && ssdgs__ply_finite(words[bad->word])) bad++;
+        if (bad < target && vertex) {
+            stats->dropped++;
+            continue;
+        }
+        if (bad < target) {
+            char name[32];
+            return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
+                               "%s: element %s, row %z, property %s: it is not finite", ply->name,
+                               ssdgs__ply_kinds[kind], row, ssdgs__ply_name(&bad->cursor, name));
+        }
+        for (const ssdgs__ply_target *t = targets; t < target; t++)
+            t->to[kept * t->step] = (ssdgs_real)ssdgs__ply_value(words[t->word]);
         kept++;
     }
-    if (kind == SSDGS__PLY_VERTEX) model->count = (int)kept;
+    if (vertex) model->count = (int)kept;
     return SSDGS_OK;
 }
 
@@ -8894,13 +9041,6 @@ static int ssdgs__has_origin(const ssdgs_settings *s) {
     return i < 3;
 }
 
-static int ssdgs__ply_has(const ssdgs__ply *ply, const ssdgs__ply_element *element, const char *name) {
-    int i;
-    for (i = 0; i < element->properties && !ssdgs__ply_is(ply->properties[element->first + i].name, name);
-         i++) {}
-    return i < element->properties;
-}
-
 /* Notes what a model will not do that its user may expect. */
 static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, const ssdgs_load_stats *stats) {
     ssdgs_context *context = model->context;
@@ -8915,8 +9055,6 @@ static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, con
     else if (model->settings.baked)
         ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing",
                     name);
-    if (stats->plain && ssdgs__ply_has(ply, ply->known[SSDGS__PLY_VERTEX], "f_rest_0"))
-        ssdgs__note(context, "%s: colours that change with the view (f_rest) are left out", name);
     if (!ply->known[SSDGS__PLY_SETTINGS] && ssdgs__has_origin(&model->settings))
         ssdgs__note(context, "%s: positions are relative to settings.origin, %g, %g, %g", name,
                     (double)model->settings.origin[0], (double)model->settings.origin[1],
@@ -8953,7 +9091,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
             "%s: sizes and opacities are still without their filter (filter_3D): save it fused", ply->name);
 
     const int ours = ply->known[SSDGS__PLY_SETTINGS] != NULL;
-    stats->plain = !ours && !(vertex->present >> SSDGS_DIFFUSE & 1);
+    stats->plain = !ours && !vertex->present[SSDGS_DIFFUSE];
     stats->untrained = !stats->plain && !ours;
     if (ours) {
         result = ssdgs__ply_read_settings(ply, &settings);
@@ -8962,15 +9100,23 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
         settings.baked = 1;
         settings.transfer = SSDGS_TRANSFER_NONE;
         settings.pixel_variance = (ssdgs_real)0.3; /* as other programs trained it */
-        const int color = vertex->present >> SSDGS__PLY_DC & 1 || !(vertex->present >> SSDGS__PLY_RGB & 1)
-                              ? SSDGS__PLY_DC
-                              : SSDGS__PLY_RGB;
+        const int color = vertex->present[SSDGS__PLY_DC] || !vertex->present[SSDGS__PLY_RGB] ? SSDGS__PLY_DC
+                                                                                             : SSDGS__PLY_RGB;
         result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, color, color + 3);
     } else { /* the published implementation keeps the rest elsewhere */
         settings = ssdgs_settings_published();
     }
     if (!result)
-        result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0, stats->plain ? SSDGS_DIFFUSE : SSDGS_CHANNELS);
+        result = ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, 0,
+                                    stats->plain     ? SSDGS_DIFFUSE
+                                    : settings.baked ? SSDGS_HARMONICS
+                                                     : SSDGS_CHANNELS);
+    if (!result && stats->plain) settings.harmonics = ssdgs__ply_harmonics(ply);
+    if (!result && ours) {
+        ply->harmonics = ssdgs__harmonics(&settings);
+        result =
+            ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, SSDGS__PLY_REST, SSDGS__PLY_REST + 3 * ply->harmonics);
+    }
     if (!result && !ours) ssdgs__ply_find_origin(ply, &settings);
     for (int kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
         const size_t expected = ssdgs__ply_rows(&settings, kind),
@@ -9239,11 +9385,11 @@ static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)ra
    f_sss. */
 static void ssdgs__average_colour(const ssdgs_model *model, size_t row, uint32_t *words) {
     const ssdgs_settings *settings = &model->settings;
-    const ssdgs_real *gaussian = model->gaussians + row;
-    const size_t stride = model->capacity;
+    ssdgs_real raw[SSDGS_CHANNELS];
+    ssdgs__gaussian_raw(model, row, raw);
     double q[4], size = 0;
     for (int i = 0; i < 4; i++) {
-        q[i] = (double)gaussian[(size_t)(SSDGS_FRAME + i) * stride];
+        q[i] = (double)raw[SSDGS_FRAME + i];
         size += q[i] * q[i];
     }
     const double scale = size > 0 ? 2 / size : 0;
@@ -9251,15 +9397,25 @@ static void ssdgs__average_colour(const ssdgs_model *model, size_t row, uint32_t
     words[SSDGS__PLY_NORMAL + 1] = ssdgs__ply_bits(scale * (q[2] * q[3] - q[0] * q[1]));
     words[SSDGS__PLY_NORMAL + 2] = ssdgs__ply_bits(1 - scale * (q[1] * q[1] + q[2] * q[2]));
     for (int i = 0; i < 3; i++) {
-        const double diffuse = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_DIFFUSE + i) * stride]);
-        const double scattering = ssdgs__ply_softplus(gaussian[(size_t)(SSDGS_SCATTERING + i) * stride]);
+        const double diffuse = ssdgs__ply_softplus(raw[SSDGS_DIFFUSE + i]);
+        const double scattering = ssdgs__ply_softplus(raw[SSDGS_SCATTERING + i]);
         double color = settings->baked
                            ? diffuse
                            : (settings->terms & SSDGS_DIFFUSE_TERM ? diffuse * 0.15915494309189535 : 0) +
                                  (settings->terms & SSDGS_SCATTERING_TERM ? scattering * 0.02 : 0);
         if (settings->transfer == SSDGS_TRANSFER_SRGB) color = (double)ssdgs_srgb_encode((ssdgs_real)color);
-        words[SSDGS__PLY_DC + i] = ssdgs__ply_bits((color - 0.5) / SSDGS__PLY_HARMONIC);
+        words[SSDGS__PLY_DC + i] = ssdgs__ply_bits((color - 0.5) / SSDGS__HARMONIC);
+        if (settings->baked && settings->transfer == SSDGS_TRANSFER_NONE)
+            words[SSDGS__PLY_DC + i] = ssdgs__ply_bits(
+                (double)model->gaussians[(size_t)(SSDGS_DIFFUSE + i) * model->capacity + row]);
     }
+}
+
+/* Whether a model's file has a property. */
+static int ssdgs__ply_written(const ssdgs_settings *s, int kind, int word) {
+    if (kind != SSDGS__PLY_VERTEX) return 1;
+    if (s->baked && word >= SSDGS_HARMONICS && word < SSDGS_CHANNELS) return 0;
+    return word < SSDGS__PLY_REST + 3 * ssdgs__harmonics(s);
 }
 
 static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row, ssdgs__writer *writer) {
@@ -9267,14 +9423,18 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
     uint32_t words[SSDGS__PLY_WORDS];
     if (kind == SSDGS__PLY_VERTEX) ssdgs__average_colour(model, row, words);
     ssdgs__ply_cursor cursor;
-    for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
+    for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         uint32_t *word = &words[cursor.word];
+        if (!ssdgs__ply_written(settings, kind, cursor.word)) continue;
         if (kind == SSDGS__PLY_SETTINGS) {
             const double value = ssdgs__number_get(cursor.field->type, (const unsigned char *)settings +
                                                                            ssdgs__ply_setting(&cursor));
             *word = cursor.field->type == 'i' ? (uint32_t)(int)value : ssdgs__ply_bits(value);
-        } else if (cursor.word < SSDGS_CHANNELS) {
+        } else if (kind != SSDGS__PLY_VERTEX || cursor.word < SSDGS_CHANNELS) {
             *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
+        } else if (cursor.word >= SSDGS__PLY_REST) {
+            const size_t plane = (size_t)(cursor.word - SSDGS__PLY_REST + SSDGS_HARMONICS);
+            *word = ssdgs__ply_bits((double)model->gaussians[plane * model->capacity + row]);
         }
         ssdgs__writer_word(writer, *word);
     }
@@ -9303,7 +9463,8 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
         char line[128], name[32];
         snprintf(line, sizeof line, "element %s %lu\n", ssdgs__ply_kinds[kind], (unsigned long)rows[kind]);
         ssdgs__writer_text(&writer, line);
-        for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind) && cursor.word < SSDGS__PLY_RGB;) {
+        for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
+            if (!ssdgs__ply_written(&model->settings, kind, cursor.word)) continue;
             snprintf(line, sizeof line, "property %s %s\n", cursor.field->type == 'i' ? "int" : "float",
                      ssdgs__ply_name(&cursor, name));
             ssdgs__writer_text(&writer, line);
@@ -10204,9 +10365,9 @@ static int ssdgs__ranked_compare(const void *a, const void *b) { /* largest firs
 static void ssdgs__reorder(ssdgs_trainer *trainer, uint64_t *keys, size_t count, ssdgs_real *scratch) {
     ssdgs_model *model = trainer->model;
     ssdgs__split(model->gaussians + SSDGS_POSITION * trainer->stride, trainer->stride, keys, count);
-    ssdgs__arrange(model->gaussians, trainer->stride, keys, count, scratch);
-    ssdgs__arrange(trainer->mean, trainer->stride, keys, count, scratch);
-    ssdgs__arrange(trainer->square, trainer->stride, keys, count, scratch);
+    ssdgs__arrange(model->gaussians, SSDGS_CHANNELS, trainer->stride, keys, count, scratch);
+    ssdgs__arrange(trainer->mean, SSDGS_CHANNELS, trainer->stride, keys, count, scratch);
+    ssdgs__arrange(trainer->square, SSDGS_CHANNELS, trainer->stride, keys, count, scratch);
     model->count = (int)count;
     ssdgs__rearranged(trainer);
 }
@@ -14135,6 +14296,53 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
         V_STORE(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s, dirradiance);
         V_STORE(drows + SSDGS__COSINE * SSDGS__BLOCK + s, dcosine);
         V_STORE(drows + SSDGS__GLOSS * SSDGS__BLOCK + s, dgloss);
+    }
+}
+
+/* ==== >>harmonics_kernel  colours of plain splats ==== */
+
+/* out (3, BLOCK) = max(0, 0.5 + sum of harmonics x their values), seen from the eye: real spherical harmonics
+   up to degree 3, with the signs of the published 3D Gaussian splatting. rows: f_dc (3), then all others of
+   red, of green, of blue. */
+SSDGS__FN void F(harmonics)(const R *position, const R *rows, int degree, const R *eye, R *out) {
+    const int more = (degree + 1) * (degree + 1) - 1;
+    for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
+        V y[15], d[3], length = V_SET(0);
+        for (int i = 0; i < 3 && more; i++) {
+            d[i] = V_SUB(V_LOAD(position + i * SSDGS__BLOCK + s), V_SET(eye[i]));
+            length = V_FMA(d[i], d[i], length);
+        }
+        if (more) {
+            length = V_DIV(V_SET(1), V_SQRT(V_MAX(length, V_SET(1e-30))));
+            for (int i = 0; i < 3; i++) d[i] = V_MUL(d[i], length);
+            y[0] = V_MUL(V_SET(-0.48860251190291992), d[1]);
+            y[1] = V_MUL(V_SET(0.48860251190291992), d[2]);
+            y[2] = V_MUL(V_SET(-0.48860251190291992), d[0]);
+        }
+        if (degree > 1) {
+            const V xx = V_MUL(d[0], d[0]), yy = V_MUL(d[1], d[1]), zz = V_MUL(d[2], d[2]);
+            const V xy = V_MUL(d[0], d[1]), yz = V_MUL(d[1], d[2]), xz = V_MUL(d[0], d[2]);
+            const V round = V_ADD(xx, yy), across = V_SUB(xx, yy),
+                    four = V_FNMA(V_SET(1), round, V_MUL(V_SET(4), zz));
+            y[3] = V_MUL(V_SET(1.0925484305920792), xy);
+            y[4] = V_MUL(V_SET(-1.0925484305920792), yz);
+            y[5] = V_MUL(V_SET(0.31539156525252005), V_SUB(V_ADD(zz, zz), round));
+            y[6] = V_MUL(V_SET(-1.0925484305920792), xz);
+            y[7] = V_MUL(V_SET(0.54627421529603959), across);
+            y[8] = V_MUL(V_MUL(V_SET(-0.59004358992664352), d[1]), V_SUB(V_MUL(V_SET(3), xx), yy));
+            y[9] = V_MUL(V_MUL(V_SET(2.8906114426405538), xy), d[2]);
+            y[10] = V_MUL(V_MUL(V_SET(-0.45704579946446572), d[1]), four);
+            y[11] = V_MUL(V_MUL(V_SET(0.3731763325901154), d[2]), V_FNMA(V_SET(3), round, V_ADD(zz, zz)));
+            y[12] = V_MUL(V_MUL(V_SET(-0.45704579946446572), d[0]), four);
+            y[13] = V_MUL(V_MUL(V_SET(1.4453057213202769), d[2]), across);
+            y[14] = V_MUL(V_MUL(V_SET(-0.59004358992664352), d[0]), V_SUB(xx, V_MUL(V_SET(3), yy)));
+        }
+        for (int c = 0; c < 3; c++) {
+            const R *value = rows + (3 + c * more) * SSDGS__BLOCK + s;
+            V sum = V_FMA(V_SET(SSDGS__HARMONIC), V_LOAD(rows + c * SSDGS__BLOCK + s), V_SET(0.5));
+            for (int i = 0; i < more; i++) sum = V_FMA(y[i], V_LOAD(value + i * SSDGS__BLOCK), sum);
+            V_STORE(out + c * SSDGS__BLOCK + s, V_MAX(V_SET(0), sum));
+        }
     }
 }
 

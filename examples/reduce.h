@@ -44,8 +44,9 @@ typedef struct reduce__pair {
 typedef struct reduce__state {
     ssdgs_context *context;  /* of the levels; its hook finds flux */
     ssdgs_settings settings; /* of the levels: what lights see, no networks */
-    size_t rows;
-    ssdgs_real *raw;    /* (SSDGS_CHANNELS, rows) raw parameters */
+    size_t rows, planes;
+    int baked;
+    ssdgs_real *raw;    /* (planes, rows) raw parameters, as ssdgs_model_view has them */
     ssdgs_real *seen;   /* (rows) opacity x area that is seen */
     ssdgs_real *flux;   /* (rows) of one light */
     uint32_t *left;     /* (count) rows */
@@ -60,6 +61,11 @@ static inline ssdgs_result reduce__walk(void *user, ssdgs_frame *frame) {
     return ssdgs_stage_cpu(frame, SSDGS_STAGE_WALK);
 }
 
+/* A colour before softplus. */
+static inline double reduce__raw(double color) {
+    return color < 2.1e-9 ? -20 : color > 30 ? color : log(expm1(color));
+}
+
 /* The Gaussians left as a model. Places of rows are kept as material, which levels do not use. */
 static inline ssdgs_result reduce__level(const reduce__state *r, ssdgs_model **level) {
     ssdgs_result result = ssdgs_model_create(r->context, &r->settings, r->count, level);
@@ -67,7 +73,11 @@ static inline ssdgs_result reduce__level(const reduce__state *r, ssdgs_model **l
     const ssdgs_model_view v = ssdgs_model_arrays(*level);
     for (size_t i = 0; i < (size_t)r->count; i++) {
         const uint32_t row = r->left[i];
-        for (size_t c = 0; c < SSDGS_MATERIAL; c++) v.gaussians[c * v.stride + i] = r->raw[c * r->rows + row];
+        for (size_t c = 0; c < (r->baked ? SSDGS_DIFFUSE : SSDGS_MATERIAL); c++)
+            v.gaussians[c * v.stride + i] = r->raw[c * r->rows + row];
+        for (size_t c = SSDGS_DIFFUSE; c < SSDGS_HARMONICS && r->baked; c++)
+            v.gaussians[c * v.stride + i] =
+                (ssdgs_real)reduce__raw(0.5 + 0.28209479177387814 * (double)r->raw[c * r->rows + row]);
         v.gaussians[SSDGS_MATERIAL * v.stride + i] = (ssdgs_real)(row & 4095);
         v.gaussians[(SSDGS_MATERIAL + 1) * v.stride + i] = (ssdgs_real)(row >> 12);
     }
@@ -235,37 +245,35 @@ static inline void reduce__merge(const reduce__state *r, const reduce__pair *pai
     const reduce__blob *a = r->blob + pair->kept, *b = r->blob + pair->gone;
     const double sum = a->seen + b->seen, w = sum > 0 ? a->seen / sum : 0.5;
     const double share = w * a->share + (1 - w) * b->share;
-    double s[9], q[4], scale[3], raw[SSDGS_CHANNELS], along = 0, length[2] = {0, 0};
+    double s[9], q[4], scale[3], raw[SSDGS_HARMONICS + 45], along = 0, length[2] = {0, 0};
     for (int i = 0; i < 9; i++)
         s[i] = w * a->covariance[i] + (1 - w) * b->covariance[i] +
                w * (1 - w) * (a->position[i / 3] - b->position[i / 3]) *
                    (a->position[i % 3] - b->position[i % 3]);
     reduce__axes(s, q, scale);
-    for (size_t c = SSDGS_FRAME; c < SSDGS_FRAME + 4; c++) {
+    for (size_t c = SSDGS_FRAME; c < SSDGS_FRAME + 4 && !r->baked; c++) {
         const double x = (double)kept[c * stride], y = (double)gone[c * stride];
         along += x * y;
         length[0] += x * x;
         length[1] += y * y;
     }
     const double turn = (along < 0 ? -1 : 1) * sqrt(length[0] / (length[1] > 0 ? length[1] : 1));
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) {
+    for (size_t c = 0; c < r->planes; c++) {
         const double x = (double)kept[c * stride], y = (double)gone[c * stride];
-        raw[c] = w * x + (1 - w) * (c >= SSDGS_FRAME && c < SSDGS_FRAME + 4 ? turn * y : y);
+        raw[c] = w * x + (1 - w) * (!r->baked && c >= SSDGS_FRAME && c < SSDGS_FRAME + 4 ? turn * y : y);
     }
     for (int c = 0; c < 3; c++) {
         raw[SSDGS_POSITION + c] = w * a->position[c] + (1 - w) * b->position[c];
         raw[SSDGS_LOG_SCALE + c] = log(scale[c]);
     }
     for (int c = 0; c < 4; c++) raw[SSDGS_ROTATION + c] = q[c];
-    for (int c = 0; c < 9; c++) { /* before softplus */
-        const double color = w * a->color[c] + (1 - w) * b->color[c];
-        raw[SSDGS_DIFFUSE + c] = color < 2.1e-9 ? -20 : color > 30 ? color : log(expm1(color));
-    }
+    for (int c = 0; c < 9 && !r->baked; c++)
+        raw[SSDGS_DIFFUSE + c] = reduce__raw(w * a->color[c] + (1 - w) * b->color[c]);
     double opacity = sum / share / reduce__area(scale);
     opacity = opacity < REDUCE__OPAQUE ? opacity : REDUCE__OPAQUE;
     opacity = log(opacity) - log1p(-opacity); /* before a sigmoid */
     raw[SSDGS_OPACITY] = opacity < -20 ? -20 : opacity;
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++) kept[c * stride] = (ssdgs_real)raw[c];
+    for (size_t c = 0; c < r->planes; c++) kept[c * stride] = (ssdgs_real)raw[c];
     r->seen[to] += r->seen[from];
 }
 
@@ -323,7 +331,9 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     if (count >= given.count) return SSDGS_OK;
     const size_t n = r.rows = (size_t)given.count, pairs = (n / REDUCE__LEAF + 2) * (REDUCE__LEAF / 2);
     r.count = given.count;
-    r.raw = (ssdgs_real *)malloc(SSDGS_CHANNELS * n * sizeof *r.raw);
+    r.planes = (size_t)given.channels;
+    r.baked = ssdgs_model_settings(*model)->baked;
+    r.raw = (ssdgs_real *)malloc(r.planes * n * sizeof *r.raw);
     r.seen = (ssdgs_real *)calloc(n, sizeof *r.seen);
     r.flux = (ssdgs_real *)calloc(n, sizeof *r.flux);
     r.left = (uint32_t *)malloc(n * sizeof *r.left);
@@ -331,7 +341,7 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     r.pair = (reduce__pair *)malloc(pairs * sizeof *r.pair);
     ssdgs_result result =
         r.raw && r.seen && r.flux && r.left && r.blob && r.pair ? SSDGS_OK : SSDGS_ERR_MEMORY;
-    for (size_t c = 0; c < SSDGS_CHANNELS && !result; c++)
+    for (size_t c = 0; c < r.planes && !result; c++)
         reduce__copy(r.raw + c * n, given.gaussians + c * given.stride, n);
     for (size_t i = 0; i < n && !result; i++) r.left[i] = (uint32_t)i;
     r.settings = ssdgs_settings_default();
@@ -355,7 +365,7 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     if (!result) result = ssdgs_model_create(context, ssdgs_model_settings(*model), r.count, &fewer);
     if (!result) {
         const ssdgs_model_view v = ssdgs_model_arrays(fewer);
-        for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+        for (size_t c = 0; c < r.planes; c++)
             for (size_t i = 0; i < (size_t)r.count; i++)
                 v.gaussians[c * v.stride + i] = r.raw[c * n + r.left[i]];
         reduce__copy(v.asg_basis, given.asg_basis, 4 * SSDGS_ASG_COUNT);

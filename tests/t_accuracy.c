@@ -314,6 +314,54 @@ static void test_encode(void) {
 }
 #endif
 
+/* Plain splats' colours: real spherical harmonics by Legendre's recurrence, with the Condon-Shortley phase.
+ */
+static double harmonic(int l, int m, const double d[3]) {
+    const double z = d[2], s = sqrt(d[0] * d[0] + d[1] * d[1]), turn = atan2(d[1], d[0]);
+    const int order = abs(m);
+    double p = 1, before = 0, scale = (2 * l + 1) / (4 * 3.14159265358979323846);
+    for (int i = 1; i <= order; i++) p *= -(2 * i - 1) * s;
+    for (int i = order + 1; i <= l; i++) {
+        const double next = ((2 * i - 1) * z * p - (i + order - 1) * before) / (i - order);
+        before = p, p = next;
+    }
+    for (int i = l - order + 1; i <= l + order; i++) scale /= i;
+    return sqrt(scale) * p * (!m ? 1 : sqrt(2) * (m > 0 ? cos(order * turn) : sin(order * turn)));
+}
+
+static void test_harmonics(void) {
+    static ssdgs_real at[3 * BLOCK], values[48 * BLOCK], color[3 * BLOCK];
+    const ssdgs_real eye[3] = {(ssdgs_real)0.25, (ssdgs_real)-0.5, (ssdgs_real)0.125};
+    static const double ahead[3] = {0, 0, 1};
+    double worst = 0;
+    EVERY_ISA {
+        int dark = 0;
+        for (int degree = 0; degree < 4; degree++) {
+            const int more = (degree + 1) * (degree + 1) - 1;
+            for (int i = 0; i < 3 * BLOCK; i++) at[i] = (ssdgs_real)(2 * draw((uint64_t)i) - 1);
+            for (int i = 0; i < 48 * BLOCK; i++) values[i] = (ssdgs_real)(2 * draw((uint64_t)(4096 + i)) - 1);
+            k->harmonics(at, values, degree, eye, color);
+            for (int i = 0; i < 3 * BLOCK; i++) {
+                const int s = i % BLOCK, c = i / BLOCK;
+                double d[3], length = 0, want = 0.5 + harmonic(0, 0, ahead) * (double)values[i];
+                for (int j = 0; j < 3; j++) d[j] = (double)at[j * BLOCK + s] - (double)eye[j];
+                for (int j = 0; j < 3; j++) length += d[j] * d[j];
+                for (int j = 0; j < 3; j++) d[j] /= sqrt(length);
+                for (int l = 1, n = 0; l <= degree; l++)
+                    for (int m = -l; m <= l; m++, n++)
+                        want += harmonic(l, m, d) * (double)values[(3 + c * more + n) * BLOCK + s];
+                dark += want < 0;
+                worst = max(worst, fabs((double)color[i] - (want > 0 ? want : 0)));
+            }
+        }
+        CHECK(dark > 10);
+        for (int i = 0; i < 3 * BLOCK; i++) at[i] = eye[i / BLOCK]; /* no direction at all */
+        k->harmonics(at, values, 3, eye, color);
+        CHECK(k->finite(color, 3 * BLOCK));
+    }
+    CHECK(worst < (sizeof(ssdgs_real) == 8 ? 1e-14 : 2e-6));
+}
+
 typedef double function(const double *p, const void *with);
 
 /* df/dp[i], of fourth order. */
@@ -933,6 +981,7 @@ int main(int argc, char **argv) {
 #else
     if (full) TEST_END();
 #endif
+    test_harmonics();
     TEST_ROW("43", "dipole: total reflectance, units", (test_dipole_total(), test_dipole_units()));
     TEST_ROW("42", "dipole: media, distances and eta at their ends", (test_dipole_points(), test_eta()));
     test_dipole_golden();

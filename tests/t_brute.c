@@ -93,7 +93,7 @@ static ssdgs_model *make_model(ssdgs_context *context) {
     ssdgs_model *model = NULL;
     if (!CHECK(!ssdgs_model_create(context, &s.settings, s.count, &model))) exit(1);
     ssdgs_model_view v = ssdgs_model_arrays(model);
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+    for (size_t c = 0; c < (size_t)v.channels; c++)
         memcpy(v.gaussians + c * v.stride, s.raw[c], (size_t)s.count * sizeof(ssdgs_real));
     memcpy(v.asg_basis, s.basis, sizeof s.basis);
     memcpy(v.asg_sharpness, s.sharpness, sizeof s.sharpness);
@@ -953,7 +953,7 @@ static void test_unity(void) {
     for (int c = 0; c < 3; c++) {
         s.options.background[c] = 1;
         for (int i = 0; i < s.count; i++)
-            s.raw[SSDGS_DIFFUSE + c][i] = (ssdgs_real)0.54132485461291806; /* softplus: 1 */
+            s.raw[SSDGS_DIFFUSE + c][i] = (ssdgs_real)1.7724538509055159; /* f_dc: 1 */
     }
     for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
         if (!contexts[isa][0]) continue;

@@ -51,7 +51,7 @@ static ssdgs_model *make_model(int count) {
     for (int c = 0; c < 3; c++) settings.ambient[c] = (ssdgs_real)(float)(0.1 + c);
     if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
     ssdgs_model_view view = ssdgs_model_arrays(model);
-    for (int channel = 0; channel < SSDGS_CHANNELS; channel++)
+    for (int channel = 0; channel < view.channels; channel++)
         for (int i = 0; i < count; i++)
             view.gaussians[(size_t)channel * view.stride + (size_t)i] = uniform(-4, 4);
     if (count > 2) { /* least, largest, minus zero */
@@ -64,6 +64,20 @@ static ssdgs_model *make_model(int count) {
     for (size_t k = 0; k < SSDGS_ASG_COUNT; k++) view.asg_sigma[k] = uniform(-1, 1);
     for (size_t k = 0; k < view.scattering_count; k++) view.scattering[k] = uniform(-1, 1);
     for (size_t k = 0; k < view.shadow_count; k++) view.shadow[k] = uniform(-1, 1);
+    return model;
+}
+
+/* Plain splats whose colours change with the view. */
+static ssdgs_model *make_baked(int count, int degree) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_model *model = NULL;
+    settings.baked = 1;
+    settings.harmonics = degree;
+    settings.transfer = SSDGS_TRANSFER_NONE;
+    if (ssdgs_model_create(context, &settings, count, &model) != SSDGS_OK) return NULL;
+    const ssdgs_model_view view = ssdgs_model_arrays(model);
+    for (size_t channel = 0; channel < (size_t)view.channels; channel++)
+        for (size_t i = 0; i < (size_t)count; i++) view.gaussians[channel * view.stride + i] = uniform(-4, 4);
     return model;
 }
 
@@ -80,8 +94,8 @@ static int same_globals(ssdgs_model *a, ssdgs_model *b) {
 
 static int same_gaussians(ssdgs_model *a, ssdgs_model *b) {
     const ssdgs_model_view u = ssdgs_model_arrays(a), v = ssdgs_model_arrays(b);
-    int equal = u.count == v.count;
-    for (int channel = 0; equal && channel < SSDGS_CHANNELS; channel++)
+    int equal = u.count == v.count && u.channels == v.channels;
+    for (int channel = 0; equal && channel < u.channels; channel++)
         equal = !memcmp(u.gaussians + (size_t)channel * u.stride, v.gaussians + (size_t)channel * v.stride,
                         (size_t)u.count * sizeof(ssdgs_real));
     return equal;
@@ -157,7 +171,7 @@ typedef struct column {
 typedef struct table {
     char name[32];
     int rows, columns;
-    struct column column[64];
+    struct column column[80];
     const unsigned char *data;
 } table;
 typedef struct document {
@@ -364,7 +378,8 @@ static void test_variants(void) {
             bytes other = emit(&d, &v);
             if (!strncmp(name, "f_dc", 4) || !strcmp(name, "nx") || !strcmp(name, "ny") ||
                 !strcmp(name, "nz") || strstr(name, "_octaves") || !strncmp(name, "origin_", 7) ||
-                !strncmp(name, "medium_", 7) || !strncmp(name, "placement_", 10)) {
+                !strncmp(name, "medium_", 7) || !strcmp(name, "harmonics") ||
+                !strncmp(name, "placement_", 10)) {
                 CHECK(load(other.data, other.size, &back, NULL) == SSDGS_OK && same(model, back));
                 ssdgs_model_destroy(back);
             } else if (!strcmp(name, "pixel_variance")) {
@@ -448,14 +463,10 @@ static void test_foreign(void) {
         CHECK(view.gaussians[view.stride + 2] == 2 && view.gaussians[SSDGS_OPACITY * view.stride] == 20 &&
               view.gaussians[SSDGS_LOG_SCALE * view.stride + 1] == (ssdgs_real)-0.25 &&
               view.gaussians[(SSDGS_ROTATION + 3) * view.stride] == (ssdgs_real)1.25);
-        CHECK(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) < 2e-6); /* below black */
-        CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1])) - 0.5 -
-                   0.28209479 * 7.5) < 1e-6);
-        ssdgs_model_view neutral;
-        if (fresh) neutral = ssdgs_model_arrays(fresh);
-        for (int channel = SSDGS_SPECULAR; channel < SSDGS_CHANNELS && fresh; channel++)
-            CHECK(view.gaussians[(size_t)channel * view.stride] ==
-                  neutral.gaussians[(size_t)channel * neutral.stride]);
+        CHECK(view.channels == SSDGS_HARMONICS + 45 && ssdgs_model_settings(back)->harmonics == 3);
+        CHECK(view.gaussians[SSDGS_DIFFUSE * view.stride] == -3 && /* below black, and kept */
+              view.gaussians[(SSDGS_DIFFUSE + 1) * view.stride + 1] == (ssdgs_real)7.5 &&
+              view.gaussians[(SSDGS_HARMONICS + 44) * view.stride + 2] == (ssdgs_real)(float)1e30);
         file = saved(back); /* a baked model keeps its colours, f_dc shows them */
         d = parse(&file);
         CHECK(fabs((double)from_bits(word_at(d.table[0].data + 28)) - 7) < 1e-5);
@@ -485,8 +496,8 @@ static void test_foreign(void) {
               view.gaussians[SSDGS_OPACITY * view.stride + 1] == -20);
         CHECK(view.gaussians[SSDGS_ROTATION * view.stride + 1] == 1);
         CHECK(view.gaussians[(SSDGS_LOG_SCALE + 1) * view.stride + 1] == -20);
-        CHECK(fabs(log1p(exp((double)view.gaussians[SSDGS_DIFFUSE * view.stride])) - 1) < 1e-6);
-        CHECK(fabs(log1p(exp((double)view.gaussians[(SSDGS_DIFFUSE + 2) * view.stride])) - 0.2) < 1e-6);
+        CHECK(fabs((double)view.gaussians[SSDGS_DIFFUSE * view.stride] * 0.28209479 - 0.5) < 1e-6);
+        CHECK(fabs((double)view.gaussians[(SSDGS_DIFFUSE + 2) * view.stride] * 0.28209479 + 0.3) < 1e-6);
     }
     ssdgs_model_destroy(back);
     free(other.data);
@@ -620,6 +631,111 @@ static void test_rows(void) {
     ssdgs_model_destroy(model);
 }
 
+/* f_rest of degrees 1 to 3 in both orders, with bands that are 0, and what is saved of it. */
+static void test_harmonics(void) {
+    enum { ROWS = 40 };
+    for (int degree = 1; degree < 4; degree++)
+        for (int mixed = 0; mixed < 2; mixed++)
+            for (int bands = 0; bands <= degree; bands++) {
+                const int file = (degree + 1) * (degree + 1) - 1, kept = (bands + 1) * (bands + 1) - 1;
+                static double value[ROWS][3][15];
+                char properties[2000] = DC, line[100];
+                bytes rows = {NULL, 0, 0};
+                for (int i = 0; i < 3 * file; i++)
+                    sprintf(properties + strlen(properties), "property float f_rest_%d\n", i);
+                for (int g = 0; g < ROWS; g++) {
+                    text(&rows, POINT "0 0 0");
+                    for (int i = 0; i < file; i++) {
+                        const double grey = (double)uniform(-1, 1);
+                        for (int c = 0; c < 3; c++)
+                            value[g][c][i] = i < kept ? floor(4096 * (grey + 0.2 * c)) / 4096 : 0;
+                    }
+                    for (int i = 0; i < 3 * file; i++) {
+                        sprintf(line, " %.9g", mixed ? value[g][i % 3][i / 3] : value[g][i / file][i % file]);
+                        text(&rows, line);
+                    }
+                    text(&rows, "\n");
+                }
+                put(&rows, "", 1);
+                sprintf(line, "%d", ROWS);
+                bytes b = ascii(line, properties, (const char *)rows.data);
+                ssdgs_load_stats stats;
+                CHECK(tells(&b, &stats, "f_rest is taken to lie coefficient by coefficient") ==
+                      (mixed && bands > 0));
+                ssdgs_model *model = NULL, *back = NULL;
+                CHECK(load(b.data, b.size, &model, &stats) == SSDGS_OK && !stats.dropped);
+                if (model) {
+                    int wrong = 0;
+                    CHECK(ssdgs_model_settings(model)->harmonics == bands &&
+                          model->channels == SSDGS_HARMONICS + 3 * kept);
+                    for (int i = 0; i < 3 * kept * ROWS; i++) {
+                        const int plane = i / ROWS, g = i % ROWS;
+                        const double is =
+                                         (double)model
+                                             ->gaussians[(size_t)(SSDGS_HARMONICS + plane) * model->capacity +
+                                                         (size_t)g],
+                                     want = value[g][plane / kept][plane % kept];
+                        wrong += !(is >= want && is <= want);
+                    }
+                    CHECK(!wrong);
+                    bytes again = saved(model);
+                    CHECK(load(again.data, again.size, &back, NULL) == SSDGS_OK && same(model, back));
+                    free(again.data);
+                }
+                ssdgs_model_destroy(back), ssdgs_model_destroy(model);
+                free(rows.data), free(b.data);
+            }
+    ssdgs_load_stats stats;
+    char properties[2000] = DC;
+    for (int i = 0; i < 46; i++) sprintf(properties + strlen(properties), "property char f_rest_%d\n", i);
+    bytes b = ascii("0", properties, "");
+    CHECK(tells(&b, &stats, "f_rest is left out: it is not of degree 1, 2 or 3"));
+    free(b.data);
+    strcpy(properties, DC);
+    for (int i = 0; i < 9; i++) sprintf(properties + strlen(properties), "property float f_rest_%d\n", i);
+    b = ascii("3", properties,
+              POINT "0 0 0 1 1 1 1 1 1 1 1 1\n" POINT "0 0 0 1 1 1 1 nan 1 1 1 1\n" POINT
+                    "0 0 0 1 1 1 1 1 1 1 1 "
+                    "inf\n");
+    CHECK(tells(&b, &stats, "2 Gaussians of 3 are left out") && stats.dropped == 2);
+    free(b.data);
+    for (int k = 0; k < 8; k++) { /* ours, of each degree, of linear colours too */
+        ssdgs_model *model = make_baked(5, k % 4), *back = NULL;
+        model->settings.transfer = k < 4 ? SSDGS_TRANSFER_NONE : SSDGS_TRANSFER_SRGB;
+        b = saved(model);
+        CHECK(load(b.data, b.size, &back, NULL) == SSDGS_OK && same(model, back));
+        if (k < 4) { /* other programs read the same colours */
+            const document d = parse(&b);
+            const ssdgs_real shown = (ssdgs_real)from_bits(word_at(d.table[0].data + 24));
+            CHECK(!memcmp(&shown, model->gaussians + SSDGS_DIFFUSE * model->capacity, sizeof shown));
+        }
+        ssdgs_gaussian g, h;
+        CHECK(!ssdgs_model_get(back, 1, &g) && !ssdgs_model_set(back, 1, &g));
+        for (size_t c = SSDGS_DIFFUSE; c < (size_t)back->channels; c++) /* also what is below black */
+            CHECK(!memcmp(back->gaussians + c * back->capacity, model->gaussians + c * model->capacity,
+                          5 * sizeof(ssdgs_real)));
+        g.diffuse[1] = (ssdgs_real)0.75;
+        CHECK(!ssdgs_model_set(back, 1, &g) && !ssdgs_model_get(back, 1, &h));
+        for (int c = 0; c < 3; c++) CHECK(fabs((double)(h.diffuse[c] - g.diffuse[c])) < 1e-5);
+        ssdgs_model_destroy(back), ssdgs_model_destroy(model);
+        free(b.data);
+    }
+    /* of 0.2.5: all planes, the colour before softplus */
+    ssdgs_model *model = make_model(7), *back = NULL;
+    model->settings.baked = 0;
+    b = saved(model);
+    const document d = parse(&b);
+    for (int c = 0; c < d.table[1].columns; c++)
+        if (!strcmp(d.table[1].column[c].name, "baked")) b.data[d.table[1].data - b.data + 4 * c] = 1;
+    CHECK(load(b.data, b.size, &back, NULL) == SSDGS_OK && back->channels == SSDGS_HARMONICS);
+    for (size_t i = 3; i < 7 && back; i++)
+        for (size_t c = SSDGS_DIFFUSE; c < SSDGS_HARMONICS; c++)
+            CHECK(fabs(0.5 + 0.28209479177 * (double)back->gaussians[c * back->capacity + i] -
+                       log1p(exp((double)model->gaussians[c * model->capacity + i]))) < 1e-5);
+    ssdgs_model_destroy(back), ssdgs_model_destroy(model);
+    free(b.data);
+}
+
 static void test_words(void) {
     static const struct {
         const char *types[3], *row;
@@ -641,8 +757,9 @@ static void test_words(void) {
         ssdgs_model *model = NULL;
         CHECK(load(b.data, b.size, &model, NULL) == SSDGS_OK);
         for (int c = 0; c < 3 && model; c++)
-            CHECK(fabs(log1p(exp((double)model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity])) -
-                       want[c]) < 2e-6);
+            CHECK(fabs(0.5 +
+                       0.28209479 * (double)model->gaussians[(size_t)(SSDGS_DIFFUSE + c) * model->capacity] -
+                       (k == 3 && c == 1 ? -1 : want[c])) < 2e-6);
         ssdgs_model_destroy(model);
         free(b.data);
     }
@@ -663,7 +780,7 @@ static void test_words(void) {
     CHECK(refused(b.data, b.size) && strstr(ssdgs_error_message(context), "without their filter"));
     free(b.data);
     b = ascii("1", DC "property float f_rest_0\n", POINT "0 0 0 1\n");
-    CHECK(tells(&b, &stats, "colours that change with the view (f_rest) are left out"));
+    CHECK(tells(&b, &stats, "f_rest is left out: it is not of degree 1, 2 or 3"));
     free(b.data);
     CHECK(refused_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float "
                        "y\nproperty float z\nproperty uchar red\n"
@@ -1594,8 +1711,7 @@ static void test_order(void) {
     ssdgs_model_destroy(back);
     free(file.data);
     ssdgs_model_destroy(model);
-    model = make_model(MANY);
-    model->settings.baked = 1;
+    model = make_baked(MANY, 2);
     file = saved(model);
     CHECK(load(file.data, file.size, &back, &stats) == SSDGS_OK && !stats.sorted && same(model, back));
     ssdgs_model_destroy(back);
@@ -1654,7 +1770,7 @@ int main(void) {
     if (ssdgs_context_create(&desc, &context) != SSDGS_OK) return 1;
     test_round_trip();
     TEST_ROW("81", "every variant of PLY", (test_variants(), test_rows()));
-    TEST_ROW("82", "other tools' files", (test_foreign(), test_words(), test_mending()));
+    TEST_ROW("82", "other tools' files", (test_foreign(), test_words(), test_harmonics(), test_mending()));
     test_look();
     test_edited();
     test_versions();

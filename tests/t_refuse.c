@@ -20,6 +20,7 @@ static const field settings_fields[] = {
 #define R(name, low, high) REAL(ssdgs_settings, name, low, high)
     I(terms, 0, 15),
     I(baked, 0, 1),
+    I(harmonics, 0, 0),
     I(transfer, 0, 1),
     I(dipole, 0, 1),
     I(asg, 0, 2),
@@ -209,6 +210,7 @@ static const preset settings_presets[] = {/* default, published: all of them */
                                           I(version, SSDGS_VERSION, SSDGS_VERSION),
                                           I(terms, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS),
                                           I(baked, 0, 0),
+                                          I(harmonics, 0, 0),
                                           I(transfer, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE),
                                           I(dipole, SSDGS_DIPOLE_JENSEN, SSDGS_DIPOLE_JENSEN),
                                           I(asg, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC),

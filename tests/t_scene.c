@@ -35,17 +35,21 @@ static void test_moved(void) {
     static const struct {
         double turn, scale, x, y, z;
         int mirror;
-    } move[5] = {{0, 4, 1, -2, 0.5, 0},
-                 {0.7, 1, 0, 0, 0, 0},
-                 {2, 0.125, 3, 1, -2, 0},
-                 {0.7, 1, 0.5, -0.25, 0.125, 1},
-                 {1, 1e4, 5e4, 0, 0, 1}};
+    } move[6] = {
+        {0, 4, 1, -2, 0.5, 0},   {0.7, 1, 0, 0, 0, 0},
+        {2, 0.125, 3, 1, -2, 0}, {0.7, 1, 0.5, -0.25, 0.125, 1},
+        {1, 1e4, 5e4, 0, 0, 1},  {0.7, 2, 0.5, -0.25, 0.125, 1}}; /* colours that change with the view */
     ssdgs_settings settings = small_settings();
-    for (int m = 0; m < 5; m++) {
+    for (int m = 0; m < 6; m++) {
         if (m == 1) settings = ssdgs_settings_published(), settings.scattering.width = 16;
         else settings = small_settings();
         settings.light_map.size = m ? 512 : 0;
+        settings.baked = m == 5, settings.harmonics = 3 * settings.baked;
         ssdgs_model *model = cloud(&settings, 0, 300, 0.5);
+        const ssdgs_model_view v = ssdgs_model_arrays(model);
+        for (size_t c = SSDGS_HARMONICS; m == 5 && c < (size_t)v.channels; c++)
+            for (size_t i = 0; i < 300; i++)
+                v.gaussians[c * v.stride + i] = (ssdgs_real)(0.6 * ssdgs__uniform(c, i) - 0.3);
         for (int part = 0; part < 3; part++) { /* without what a light's map finds; with it; one from afar */
             ssdgs_render_options options = ssdgs_render_options_exact();
             ssdgs_camera camera = camera_from(0.4, -2.2, 0.8), moved = camera;
@@ -1154,7 +1158,7 @@ static void test_out_of_sight(void) {
                 }
             objects[i] = ssdgs_object_default(models[i]);
             const ssdgs_model_view part = ssdgs_model_peek(models[i]);
-            for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+            for (size_t c = 0; c < (size_t)part.channels; c++)
                 memcpy(whole.gaussians + c * whole.stride + 64 * i, part.gaussians + c * part.stride,
                        64 * sizeof(ssdgs_real));
         }

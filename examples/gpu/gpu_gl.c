@@ -197,7 +197,7 @@ typedef struct gpu_frame {
     gpu_buffer facts;      /* (views) */
     gpu_light *light;
     int lights;           /* that there is room for */
-    gpu_buffer gaussians; /* (SSDGS_CHANNELS, stride) the model's */
+    gpu_buffer gaussians; /* (channels, stride) the model's */
     gpu_buffer seen, visibility, depth_cue, flux;
     gpu_buffer shaded, color, layers; /* shaded: its count, then the Gaussians */
     gpu_buffer pixels, layer_pixels, transmittance, pixel_visibility, pixel_shadow;
@@ -1163,7 +1163,7 @@ static void gpu_upload_model(gpu *g, const ssdgs_placed *o) {
     const ssdgs_model_view *v = &o->gaussians;
     const int known = g->model == o->model && g->revision == o->revision;
     if (!known) {
-        gpu_upload(g, &g->frame.gaussians, v->gaussians, v->stride * SSDGS_CHANNELS * sizeof(float));
+        gpu_upload(g, &g->frame.gaussians, v->gaussians, v->stride * (size_t)v->channels * sizeof(float));
         gpu_upload_networks(g, o);
     }
     if (!known || !g->sky_ready) gpu_upload_sky_shares(g, o);
@@ -1292,7 +1292,7 @@ static int gpu_holds(const gpu *g, const ssdgs_frame *frame) {
     const double n = frame->count, lights = frame->light_count, layers = frame->layer_count + 1,
                  pixels = (double)frame->camera.width * frame->camera.height,
                  sizes[4] = {3 * pixels * layers, 4 * n * layers,
-                             (double)o->gaussians.stride * SSDGS_CHANNELS,
+                             (double)o->gaussians.stride * o->gaussians.channels,
                              n * lights * (frame->flux ? GPU_LENGTHS : 1)};
     int holds = 1;
     for (int i = 0; i < 4; i++) holds = holds && sizes[i] * sizeof(float) <= g->most;
