@@ -101,6 +101,9 @@ test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' val
 test-editors: $(BUILD)/relight $(BUILD)/export ## models that went through an editor of splats, splat-transform; needs node, npm and its registry
 	sh tests/editors.sh $(BUILD)
 
+test-plain: $(BUILD)/relight ## plain splats with spherical harmonics beside Spark in headless Chromium; needs node, npm, its registry and chromium
+	sh tests/plain.sh $(BUILD)
+
 test-images: $(BUILD)/pixels ## images that other programs wrote, beside what these make of them; leaves out what is missing
 	sh tests/images.sh $(BUILD)
 
@@ -207,5 +210,5 @@ $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo view web test-browser test-gltf test-editors test-images test-gpu test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo view web test-browser test-gltf test-editors test-plain test-images test-gpu test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

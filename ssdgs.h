@@ -110,7 +110,8 @@ FILES
   then ssdgs_settings, asg_basis, scattering_weight and shadow_weight. x y z are relative to settings.origin.
   PlayCanvas' tools, three, Babylon, Spark, GaussianSplats3D and loaders.gl read it; examples/export.c writes
   files for gsplat and spz-js, which take nothing behind the vertices. Models of older versions load. A plain
-  splat file loads as baked colours: drawn as they are, not trained.
+  splat file loads as baked colours, which change with the view by harmonics up to degree 3, in either order
+  of f_rest: drawn as they are, not trained. It takes 14 planes of a Gaussian, 59 with degree 3.
   Reading takes ASCII and both byte orders, skips what it does not know, and mends or drops broken Gaussians
   (ssdgs_load_stats). Limits: 2^28 Gaussians, a header of 1 MiB with 64 elements and 1024 properties.
   Editors of splats drop what lies behind the vertices, and move these: examples/adopt.h mends that.
@@ -157,7 +158,7 @@ BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
   adopt.h mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in
   OpenGL 4.3. Nothing finds cameras or lights (options.refine corrects small errors), traces light between
-  objects, undistorts lenses, compresses models, or evaluates spherical harmonics beyond degree 0.
+  objects, undistorts lenses, or compresses models.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
@@ -167,6 +168,7 @@ CHANGES, for programs written for 0.2.4
   notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
   a hook's view is `cached` 1    2; 1 says that WALK is to be done again
+  raw planes of a baked model    14, and f_rest behind: ssdgs_model_view.channels; SSDGS_DIFFUSE is f_dc
 
 CONTENTS, search for the tag
   >>config >>memory >>threads >>cpu  compiler and CPU; contexts and errors; the pool; which kernels run
@@ -1277,10 +1279,11 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__SPLAT SSDGS_SPLAT_GRADIENTS
 #define SSDGS__SLOTS \
     16 /* partial sums of shared gradients: fixed, so that threads cannot change the result */
-#define SSDGS__GLANCES 2000  /* of a thread before it sleeps: about 0.1 ms on x86 */
-#define SSDGS__BAND 16       /* image rows of a task */
-#define SSDGS__CHUNK 1024    /* Gaussians projected by one task */
-#define SSDGS__BIN_CHUNKS 64 /* tasks that make a view's tile lists */
+#define SSDGS__GLANCES 2000         /* of a thread before it sleeps: about 0.1 ms on x86 */
+#define SSDGS__BAND 16              /* image rows of a task */
+#define SSDGS__CHUNK 1024           /* Gaussians projected by one task */
+#define SSDGS__BIN_CHUNKS 64        /* tasks that make a view's tile lists */
+#define SSDGS__SORT_WORDS (1 << 12) /* of a histogram */
 #ifndef SSDGS__BATCH_BYTES
 #define SSDGS__BATCH_BYTES ((size_t)1 << 28) /* of views walked together, 80 a Gaussian */
 #endif
@@ -3226,7 +3229,7 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
 typedef struct ssdgs__view_memory {
     ssdgs__buffer light_map, map_tile; /* the view's own; the batches share the rest */
     ssdgs__buffer record, depth, keys, order, instance, of_gaussian, start, list, seen, needed, sums,
-        histogram; /* keys are the sort's, then boxes of Gaussians and instances of ranks, to bin them */
+        histogram;
     uint64_t chunk_room[SSDGS__BIN_CHUNKS];
 } ssdgs__view_memory;
 
@@ -4693,7 +4696,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     if (cue) SSDGS__KEEP(m->cue, frame->depth_cue, ssdgs_real, lit);
     if (transport) SSDGS__KEEP(m->flux, frame->flux, ssdgs_real, lit);
     SSDGS__RESERVE(w->shaded, frame->shaded, uint32_t, n);
-    SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4);
+    SSDGS__RESERVE(w->color, frame->color, ssdgs_real, n * 4 + SSDGS__SORT_WORDS);
     if (deferred) {
         frame->layer_count = SSDGS__LIGHT_LAYER - 1 + SSDGS__PER_LIGHT * frame->light_count;
         const size_t layers = ssdgs__times(n * 4, (size_t)frame->layer_count);
@@ -4835,18 +4838,35 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
+/* What SORT and BIN work in: of each Gaussian two keys, then a box; of each rank its instances. The camera's
+   is where its colours will be. */
+static void *ssdgs__bin_memory(const ssdgs_frame *frame, int view) {
+    return view ? ssdgs__view_memory_of(frame, view)->keys.memory : frame->scratch->color.memory;
+}
+
+static ssdgs_result ssdgs__bin_reserve(const ssdgs_frame *frame) {
+    ssdgs_context *context = frame->context;
+    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
+        uint32_t *words;
+        if (!i || frame->views[i].cached) continue;
+        SSDGS__RESERVE(ssdgs__view_memory_of(frame, i)->keys, words, uint32_t,
+                       4 * (size_t)frame->count + SSDGS__SORT_WORDS);
+        (void)words;
+    }
+    return SSDGS_OK;
+}
+
 /* Least-significant-digit radix sort of (depth bits, index): stable, so equal depths keep the order of their
-   indices. */
+   indices. Depths that are alike differ in few bits, which take fewer passes. */
 static void ssdgs__sort_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     ssdgs_splat_view *v = frame->views + frame->batch[0] + index;
     const int n = frame->count;
     if (v->cached) return;
-    uint64_t *from = (uint64_t *)ssdgs__view_memory_of(frame, frame->batch[0] + index)->keys.memory,
-             *to = from + n;
+    uint64_t *from = (uint64_t *)ssdgs__bin_memory(frame, frame->batch[0] + index), *to = from + n;
     uint32_t *histogram = (uint32_t *)(to + n);
-    int visible = 0;
-    memset(histogram, 0, 3 * 2048 * sizeof *histogram);
+    uint32_t low = UINT32_MAX, high = 0;
+    int visible = 0, width = 0;
     for (int begin = 0, stop; ssdgs__reached_next(frame, v->light, &begin, n, &stop); begin = stop)
         for (int i = begin; i < stop; i++) {
             const float depth = (float)v->depth[i];
@@ -4854,18 +4874,24 @@ static void ssdgs__sort_task(void *data, int index) {
             uint32_t bits;
             memcpy(&bits, &depth, 4);
             from[visible++] = (uint64_t)bits << 32 | (uint32_t)i;
-            histogram[bits & 2047]++;
-            histogram[2048 + (bits >> 11 & 2047)]++;
-            histogram[4096 + (bits >> 22)]++;
+            low = bits < low ? bits : low;
+            high = bits > high ? bits : high;
         }
-    for (int pass = 0; pass < 3; pass++) {
-        uint32_t *h = histogram + 2048 * pass, sum = 0;
-        for (int i = 0; i < 2048; i++) {
-            const uint32_t count = h[i];
-            h[i] = sum;
+    while (width < 32 && visible && (high - low) >> width) width++;
+    const int passes = (width + 11) / 12, digit = passes ? (width + passes - 1) / passes : 0;
+    for (int pass = 0; pass < passes; pass++) {
+        const uint32_t mask = (1u << digit) - 1;
+        const int shift = digit * pass;
+        uint32_t sum = 0;
+        memset(histogram, 0, (mask + 1) * sizeof *histogram);
+        for (int i = 0; i < visible; i++) histogram[((uint32_t)(from[i] >> 32) - low) >> shift & mask]++;
+        for (uint32_t i = 0; i <= mask; i++) {
+            const uint32_t count = histogram[i];
+            histogram[i] = sum;
             sum += count;
         }
-        for (int i = 0; i < visible; i++) to[h[from[i] >> (32 + 11 * pass) & 2047]++] = from[i];
+        for (int i = 0; i < visible; i++)
+            to[histogram[((uint32_t)(from[i] >> 32) - low) >> shift & mask]++] = from[i];
         uint64_t *swap = from;
         from = to;
         to = swap;
@@ -4880,12 +4906,11 @@ static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
     const size_t n = (size_t)frame->count;
     for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         ssdgs__view_memory *m = ssdgs__view_memory_of(frame, i);
-        uint64_t *keys;
         if (frame->views[i].cached) continue;
-        SSDGS__RESERVE(m->keys, keys, uint64_t, 2 * n + 3 * 1024);
         SSDGS__RESERVE(m->order, frame->views[i].order, uint32_t, n + 1);
-        (void)keys;
     }
+    const ssdgs_result result = ssdgs__bin_reserve(frame);
+    if (result) return result;
     ssdgs__parallel(context, frame->batch[1] - frame->batch[0], ssdgs__sort_task, frame);
     return SSDGS_OK;
 }
@@ -4922,7 +4947,7 @@ static void ssdgs__bin_room_task(void *data, int index) {
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
     for (; ssdgs__reached_next(frame, v->light, &begin, end, &stop); begin = stop)
         for (int g = begin; g < stop; g++) {
-            uint16_t *box = (uint16_t *)m->keys.memory + 4 * (size_t)g;
+            uint16_t *box = (uint16_t *)ssdgs__bin_memory(frame, view) + 4 * (size_t)g;
             if (v->depth[g] >= 0) {
                 ssdgs__tile_box(v, v->record + g, box);
                 room += (uint64_t)(box[2] - box[0] + 1) * (uint64_t)(box[3] - box[1] + 1);
@@ -4945,8 +4970,8 @@ static void ssdgs__bin_task(void *data, int index) {
     int begin, end, stop;
     ssdgs__bin_range(frame->count, chunk, &begin, &end);
     for (; ssdgs__reached_next(frame, v->light, &begin, end, &stop); begin = stop)
-        number = frame->context->k->bin(v, (const uint16_t *)m->keys.memory, ssdgs__log2_threshold(frame),
-                                        begin, stop, number);
+        number = frame->context->k->bin(v, (const uint16_t *)ssdgs__bin_memory(frame, view),
+                                        ssdgs__log2_threshold(frame), begin, stop, number);
 }
 
 static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk) {
@@ -4960,9 +4985,8 @@ static uint32_t *ssdgs__histogram(const ssdgs_frame *frame, int view, int chunk)
 static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
-    const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
     const ssdgs_splat_view *v = frame->views + view;
-    ssdgs_instances *of_rank = (ssdgs_instances *)m->keys.memory + frame->count;
+    ssdgs_instances *of_rank = (ssdgs_instances *)ssdgs__bin_memory(frame, view) + frame->count;
     if (v->cached) return;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
@@ -5002,8 +5026,7 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
 static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
-    const ssdgs__view_memory *m = ssdgs__view_memory_of(frame, view);
-    const ssdgs_instances *of_rank = (const ssdgs_instances *)m->keys.memory + frame->count;
+    const ssdgs_instances *of_rank = (const ssdgs_instances *)ssdgs__bin_memory(frame, view) + frame->count;
     const ssdgs_splat_view *v = frame->views + view;
     if (v->cached) return;
     uint32_t *place = ssdgs__histogram(frame, view, chunk);
@@ -5025,12 +5048,8 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->count;
     const int views = frame->batch[1] - frame->batch[0], tasks = views * SSDGS__BIN_CHUNKS;
-    for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
-        ssdgs_instances *work; /* a hook may have sorted */
-        if (frame->views[i].cached) continue;
-        SSDGS__RESERVE(ssdgs__view_memory_of(frame, i)->keys, work, ssdgs_instances, 2 * n + 1);
-        (void)work;
-    }
+    const ssdgs_result result = ssdgs__bin_reserve(frame); /* a hook may have sorted */
+    if (result) return result;
     ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
     for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         ssdgs_splat_view *v = frame->views + i;
