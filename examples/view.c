@@ -24,7 +24,9 @@ static void tell(const char *name, const ssdgs_model *model, const ssdgs_load_st
     const int mended = read->zero_rotations + read->clamped_opacities + read->clamped_scales;
     fprintf(stderr, "view: %s: %d Gaussians", name, ssdgs_model_count(model));
     if (read->dropped || mended) fprintf(stderr, ", %d dropped, %d mended", read->dropped, mended);
-    fprintf(stderr, "%s%s%s\n", read->sorted ? ", sorted" : "", read->plain ? ", plain splats" : "",
+    fprintf(stderr, "%s%s", read->sorted ? ", sorted" : "", read->plain ? ", plain splats" : "");
+    if (read->plain) fprintf(stderr, " of degree %d", ssdgs_model_settings(model)->harmonics);
+    fprintf(stderr, "%s\n",
             read->untrained ? ", without the settings and networks that an editor has dropped" : "");
 }
 
