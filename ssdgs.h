@@ -327,8 +327,7 @@ typedef struct ssdgs_settings {
     int version;   /* set by ssdgs_settings_default / _published */
     int terms;     /* SSDGS_*_TERM mask: what the model has */
     int baked;     /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
-    int harmonics; /* degree, 0 .. 3, of the spherical harmonics by which a baked colour changes with the view
-                    */
+    int harmonics; /* degree, 0 .. 3, of the harmonics by which baked colours change with the view */
     int transfer;  /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
     int dipole;    /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
     int asg;       /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
@@ -6381,9 +6380,9 @@ static void ssdgs__baked(const ssdgs_frame *frame, const ssdgs_placed *o, const 
     const ssdgs__kernels *k = frame->context->k;
     for (int c = SSDGS_DIFFUSE; c < o->gaussians.channels; c++) {
         const ssdgs_real *plane = o->gaussians.gaussians + (size_t)c * o->gaussians.stride;
-        for (int s = 0; s < SSDGS__BLOCK; s++) *rows++ = plane[at[s] - (size_t)o->first];
+        ssdgs_real *row = rows + (c - SSDGS_DIFFUSE) * SSDGS__BLOCK;
+        for (int s = 0; s < SSDGS__BLOCK; s++) row[s] = plane[at[s] - (size_t)o->first];
     }
-    rows -= (o->gaussians.channels - SSDGS_DIFFUSE) * SSDGS__BLOCK;
     k->harmonics(position, rows, o->settings.harmonics, ssdgs__lightings(frame, o)->eye, outs);
     if (o->settings.transfer == SSDGS_TRANSFER_NONE && frame->settings.transfer == SSDGS_TRANSFER_SRGB)
         k->srgb_decode(outs, outs, 3 * SSDGS__BLOCK);

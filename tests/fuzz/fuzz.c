@@ -129,6 +129,7 @@ static void more_settings(input *in, ssdgs_settings *s) {
     if (flags & 1) s->scattering.layers = 0, s->transport = 1;
     if (flags & 2) s->octaves.view = draw_below(in, 9);
     if (flags & 4) s->octaves.light = draw_below(in, 9);
+    if (s->baked) s->harmonics = flags >> 6;
     for (int i = 0; i < 3; i++) {
         s->medium.scattering[i] = draw_size(in, 3, 20);
         s->medium.absorption[i] = draw_size(in, 0.1, 1);
@@ -144,7 +145,7 @@ static ssdgs_model *draw_model(input *in, ssdgs_context *context, int most, inpu
     if (more) more_settings(more, &settings);
     if (ssdgs_model_create(context, &settings, draw_below(in, most + 1), &model)) return NULL;
     for (int i = 0; i < model->count; i++)
-        for (int c = 0; c < SSDGS_CHANNELS; c++) {
+        for (int c = 0; c < model->channels; c++) {
             ssdgs_real *value = model->gaussians + (size_t)c * model->capacity + i;
             *value = draw_real(in, (double)*value, c < SSDGS_ROTATION ? 1 : 6);
         }
@@ -222,7 +223,7 @@ static int all_finite(const ssdgs_real *values, size_t count) {
 
 static int model_finite(const ssdgs_model *model) {
     int finite = all_finite(model->globals, model->global_count) && all_finite(model->settings.ambient, 3);
-    for (int c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < model->channels; c++)
         finite &= all_finite(model->gaussians + (size_t)c * model->capacity, (size_t)model->count);
     return finite;
 }
@@ -230,7 +231,7 @@ static int model_finite(const ssdgs_model *model) {
 static uint64_t model_hash(const ssdgs_model *model) {
     uint64_t hash = ssdgs__fold(1, model->globals, model->global_count * sizeof(ssdgs_real));
     hash = ssdgs__fold(hash, model->settings.ambient, sizeof model->settings.ambient);
-    for (int c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < model->channels; c++)
         hash = ssdgs__fold(hash, model->gaussians + (size_t)c * model->capacity,
                            (size_t)model->count * sizeof(ssdgs_real));
     return hash;
@@ -356,7 +357,8 @@ static void fuzz_render(const unsigned char *data, size_t size) {
             HOLDS(!ssdgs_context_create(&desc, &other) &&
                   !ssdgs_model_create(other, &model->settings, model->count, &twin));
             memcpy(twin->globals, model->globals, model->global_count * sizeof(ssdgs_real));
-            memcpy(twin->gaussians, model->gaussians, model->capacity * SSDGS_CHANNELS * sizeof(ssdgs_real));
+            memcpy(twin->gaussians, model->gaussians,
+                   model->capacity * (size_t)model->channels * sizeof(ssdgs_real));
             HOLDS(!take_picture(twin, &again));
             check_same(p, &again);
             drop_picture(&again);
@@ -639,7 +641,7 @@ static void fuzz_train(const unsigned char *data, size_t size) {
     for (int i = 0; i < photo_count; i++) more_photo(&in, photos + i, pixels[i], more[i]);
     model = redraw_model(model, from, 8, &in);
     if (model && done(context, ssdgs_trainer_create(model, photos, photo_count, &options, &trainer))) {
-        trainer->iteration = start;
+        trainer->run.iteration = start;
         while (steps-- > 0) step_holds(trainer);
         HOLDS(model->count <= (options.max_gaussians > 40 ? options.max_gaussians : 40));
     }
