@@ -510,7 +510,11 @@ static void fuzz_scene(const unsigned char *data, size_t size) {
         for (int i = 0; i < p.object_count; i++) p.objects[i] = draw_object(&in, models);
         if (flags & 2) draw_matrices(&in, context, &p.camera);
         if (flags & 4) draw_sky(&in, context, &p);
+        int edited[MOST_OBJECTS]; /* merging its Gaussians makes another model */
+        for (int i = 0; i < p.object_count; i++) edited[i] = p.objects[i].model == models[flags & 1];
         if (flags & 8) edit_model(&in, models + (flags & 1));
+        for (int i = 0; i < p.object_count; i++)
+            if (edited[i]) p.objects[i].model = models[flags & 1];
         p.passes = draw(&in);
         ssdgs_occluder occluder = {occlude, &p, 0};
         occluder.revision = (uint64_t)p.passes;
