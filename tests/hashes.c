@@ -25,7 +25,7 @@ static void see(const void *data, size_t size) { /* FNV-1a */
 
 static void see_model(ssdgs_model *model) {
     ssdgs_model_view v = ssdgs_model_arrays(model);
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+    for (size_t c = 0; c < (size_t)v.channels; c++)
         see(v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
     see(v.scattering, v.scattering_count * sizeof(ssdgs_real));
     see(v.shadow, v.shadow_count * sizeof(ssdgs_real));

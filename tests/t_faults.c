@@ -343,7 +343,7 @@ static void end_world(void) {
 
 static uint64_t hash_model(uint64_t hash, const ssdgs_model *m) {
     hash = ssdgs__fold(ssdgs__fold(hash, &m->settings, sizeof m->settings), &m->count, sizeof m->count);
-    for (int c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < m->channels; c++)
         hash =
             ssdgs__fold(hash, m->gaussians + (size_t)c * m->capacity, (size_t)m->count * sizeof(ssdgs_real));
     return ssdgs__fold(hash, m->globals, m->global_count * sizeof(ssdgs_real));
@@ -501,7 +501,7 @@ static int all_finite(const ssdgs_real *values, size_t n) {
 
 static int finite_model(const ssdgs_model *m) {
     int good = all_finite(m->globals, m->global_count);
-    for (int c = 0; c < SSDGS_CHANNELS; c++)
+    for (int c = 0; c < m->channels; c++)
         good &= all_finite(m->gaussians + (size_t)c * m->capacity, (size_t)m->count);
     return good;
 }

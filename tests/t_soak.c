@@ -61,7 +61,7 @@ static uint64_t fnv(uint64_t hash, const void *words, size_t size) {
 static uint64_t hash_model(ssdgs_model *model) {
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     uint64_t hash = fnv(FNV_START, &v.count, sizeof v.count);
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+    for (size_t c = 0; c < (size_t)v.channels; c++)
         hash = fnv(hash, v.gaussians + c * v.stride, (size_t)v.count * sizeof(ssdgs_real));
     return fnv(hash, model->globals, model->global_count * sizeof(ssdgs_real));
 }
@@ -70,7 +70,7 @@ static uint64_t hash_model(ssdgs_model *model) {
 static double largest_parameter(ssdgs_model *model) {
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     double most = 0;
-    for (size_t c = 0; c < SSDGS_CHANNELS; c++)
+    for (size_t c = 0; c < (size_t)v.channels; c++)
         for (size_t i = 0; i < (size_t)v.count; i++) {
             const double x = fabs((double)v.gaussians[c * v.stride + i]);
             most = test_finite(x) ? x > most ? x : most : HUGE_VAL;
@@ -102,7 +102,7 @@ static ssdgs_model *new_truth(ssdgs_context *context) {
     if (!CHECK(!ssdgs_model_create(context, NULL, TRUTH, &model))) exit(1);
     ssdgs_model_view v = ssdgs_model_arrays(model);
     for (int i = 0; i < TRUTH; i++)
-        for (int c = 0; c < SSDGS_CHANNELS; c++) {
+        for (int c = 0; c < v.channels; c++) {
             const double u = 2 * ssdgs__uniform(11, (uint64_t)(64 * i + c)) - 1;
             const int scale = c >= SSDGS_LOG_SCALE && c < SSDGS_OPACITY;
             v.gaussians[(size_t)c * v.stride + (size_t)i] = (ssdgs_real)(c < 3                ? 0.35 * u
