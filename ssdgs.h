@@ -837,7 +837,7 @@ typedef struct ssdgs_model_view {
     size_t stride;             /* reals from one plane to the next */
     int channels;              /* planes: SSDGS_CHANNELS; baked: SSDGS_HARMONICS + 0, 9, 24 or 45 */
     ssdgs_real *gaussians;     /* (channels, stride): scale = exp, opacity = sigmoid, colours and weights =
-                                  softplus; deferred, ssdgs_gaussian's specular is sqrt(lambda mu) times c_s */
+                                  softplus; deferred, ssdgs_gaussian's specular is c_s sqrt(lambda mu) */
     ssdgs_real *asg_basis;     /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
     ssdgs_real *asg_sharpness; /* (SSDGS_ASG_COUNT, 2) log lambda, log mu; deferred: log s, logit t */
     ssdgs_real *asg_sigma;     /* (SSDGS_ASG_COUNT) deferred: a before softplus; else unused */
@@ -1624,6 +1624,9 @@ static SSDGS__INLINE float ssdgs__exponent(float x) {
     memcpy(&bits, &x, 4);
     return (float)((int)(bits >> 23) - 127);
 }
+
+/* How many harmonics there are up to a degree, but for the constant one. */
+static SSDGS__INLINE int ssdgs__harmonics(int degree) { return (degree + 1) * (degree + 1) - 1; }
 
 static int ssdgs__finite(ssdgs_real x) {
 #ifdef SSDGS_REAL64
@@ -2657,15 +2660,14 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
                   "settings: scattering.layers = 1, where 0 or 2 .. %d are allowed", SSDGS_MAX_LAYERS);
     const int medium = ssdgs__has_medium(s, s->terms);
     for (const ssdgs__number *n = ssdgs__settings; n < ssdgs__settings + SSDGS__SETTING_COUNT; n++) {
-        const int idle = n->at >= offsetof(ssdgs_settings, medium.scattering) && !medium;
-        double low = n->low; /* some depends on others */
+        double low = n->low, high = n->high; /* some depend on others */
+        if (n->at == offsetof(ssdgs_settings, harmonics) && !s->baked) high = 0;
         if (n->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
         if (n->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
         if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
-        const double most = idle                                                        ? (double)FLT_MAX
-                            : n->at == offsetof(ssdgs_settings, harmonics) && !s->baked ? 0
-                                                                                        : n->high;
-        const ssdgs_result result = ssdgs__number_check(context, "settings", n, s, idle ? -most : low, most);
+        if (n->at >= offsetof(ssdgs_settings, medium.scattering) && !medium)
+            high = (double)FLT_MAX, low = -high;
+        const ssdgs_result result = ssdgs__number_check(context, "settings", n, s, low, high);
         if (result) return result;
     }
     SSDGS__REFUSE(s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9,
@@ -2673,9 +2675,6 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     SSDGS__REFUSE(medium && !s->transport, "settings: a medium needs transport = 1");
     return SSDGS_OK;
 }
-
-/* Values of a baked colour's harmonics but for f_dc, of each channel. */
-static int ssdgs__harmonics(const ssdgs_settings *s) { return (s->harmonics + 1) * (s->harmonics + 1) - 1; }
 
 /* A neutral raw value: grey, opacity 0.1, everything else at the start of training. */
 static ssdgs_real ssdgs__neutral(int channel) {
@@ -2762,7 +2761,7 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
     size_t bytes;
-    model->channels = s.baked ? SSDGS_HARMONICS + 3 * ssdgs__harmonics(&s) : SSDGS_CHANNELS;
+    model->channels = s.baked ? SSDGS_HARMONICS + 3 * ssdgs__harmonics(s.harmonics) : SSDGS_CHANNELS;
     if (!ssdgs__product_fits(model->capacity, (size_t)model->channels * sizeof(ssdgs_real), &bytes))
         bytes = SIZE_MAX;
     if (model->globals) model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
@@ -2926,22 +2925,20 @@ static void ssdgs__specular_store(const ssdgs_real specular[3], int deferred, ss
 
 /* The raw parameters of a Gaussian; those of highlights only where the model's are deferred. A frame that
    already has the normal stays unless the Gaussian turns: training has found its tangents. */
-static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real *plane, size_t stride) {
+static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_real to[SSDGS_CHANNELS]) {
     double raw[SSDGS_CHANNELS], size = 0;
     const int flat = g->normal[0] == 0 && g->normal[1] == 0 && g->normal[2] == 0;
     double along = 0, length = 0, dot = 0, was = 0;
-    for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = (double)plane[(size_t)i * stride];
-    ssdgs_real old[4];
+    for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = (double)to[i];
     for (int i = 0; i < 4; i++) {
         const double before = raw[SSDGS_ROTATION + i], now = (double)g->rotation[i];
         raw[SSDGS_ROTATION + i] = now;
         dot += before * now, was += before * before, size += now * now;
-        old[i] = plane[(size_t)(SSDGS_FRAME + i) * stride];
     }
     const int turned = !(dot * dot > 0.999999 * was * size);
     if (!(size > 0)) ssdgs__turn_to(g->normal, raw + SSDGS_ROTATION, raw + SSDGS_ROTATION);
     ssdgs_real q[4], r[9];
-    ssdgs__rotation_scalar(old, q, r);
+    ssdgs__rotation_scalar(to + SSDGS_FRAME, q, r);
     for (int i = 0; i < 3; i++) {
         along += (double)r[3 * i + 2] * (double)g->normal[i];
         length += (double)g->normal[i] * (double)g->normal[i];
@@ -2961,14 +2958,12 @@ static void ssdgs__gaussian_store(const ssdgs_gaussian *g, int deferred, ssdgs_r
         raw[SSDGS_ASG_WEIGHT + 3] = ssdgs__logit((double)g->softness);
     }
     for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++) raw[SSDGS_MATERIAL + i] = (double)g->material[i];
-    for (int i = 0; i < SSDGS_CHANNELS; i++) plane[(size_t)i * stride] = (ssdgs_real)raw[i];
-    ssdgs__specular_store(g->specular, deferred, plane, stride);
+    for (int i = 0; i < SSDGS_CHANNELS; i++) to[i] = (ssdgs_real)raw[i];
+    ssdgs__specular_store(g->specular, deferred, to, 1);
 }
 
 /* deferred 0: specular is c_s itself, not a lobe's height. */
-static void ssdgs__gaussian_load(ssdgs_gaussian *g, int deferred, const ssdgs_real *plane, size_t stride) {
-    ssdgs_real raw[SSDGS_CHANNELS];
-    for (int i = 0; i < SSDGS_CHANNELS; i++) raw[i] = plane[(size_t)i * stride];
+static void ssdgs__gaussian_load(ssdgs_gaussian *g, int deferred, const ssdgs_real raw[SSDGS_CHANNELS]) {
     const ssdgs_real height = deferred ? ssdgs__lobe_height(raw + SSDGS_ASG_WEIGHT, 1) : 1;
     ssdgs_real q[4], r[9];
     ssdgs__rotation_scalar(raw + SSDGS_FRAME, q, r);
@@ -2992,7 +2987,7 @@ SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void) {
     ssdgs_real plane[SSDGS_CHANNELS];
     ssdgs__gaussian_reset(plane, 1, 0);
     ssdgs_gaussian g;
-    ssdgs__gaussian_load(&g, 1, plane, 1);
+    ssdgs__gaussian_load(&g, 1, plane);
     return g;
 }
 
@@ -3068,8 +3063,8 @@ SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdg
         ssdgs_real raw[SSDGS_CHANNELS];
         ssdgs_gaussian was;
         ssdgs__gaussian_raw(model, (size_t)index, raw);
-        ssdgs__gaussian_load(&was, deferred, raw, 1);
-        ssdgs__gaussian_store(gaussian, deferred, raw, 1);
+        ssdgs__gaussian_load(&was, deferred, raw);
+        ssdgs__gaussian_store(gaussian, deferred, raw);
         for (int c = 0; c < (baked ? SSDGS_HARMONICS : SSDGS_CHANNELS); c++) {
             ssdgs_real *to = model->gaussians + (size_t)c * model->capacity + index;
             const int color = baked && c >= SSDGS_DIFFUSE ? c - SSDGS_DIFFUSE : -1;
@@ -3089,7 +3084,7 @@ SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdg
     ssdgs_real raw[SSDGS_CHANNELS];
     if (!result) {
         ssdgs__gaussian_raw(model, (size_t)index, raw);
-        ssdgs__gaussian_load(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, raw, 1);
+        ssdgs__gaussian_load(gaussian, model->settings.asg == SSDGS_ASG_DEFERRED, raw);
     }
     return ssdgs__leave(model->context, result);
 }
@@ -3175,7 +3170,9 @@ static void ssdgs__gaussians_update(ssdgs_model *model, int version) {
     const int older = version <= 200 && model->settings.asg == SSDGS_ASG_DEFERRED && !model->settings.baked;
     for (size_t i = 0; i < (size_t)model->count && older; i++) {
         ssdgs_gaussian g;
-        ssdgs__gaussian_load(&g, 0, model->gaussians + i, model->capacity);
+        ssdgs_real raw[SSDGS_CHANNELS];
+        ssdgs__gaussian_raw(model, i, raw);
+        ssdgs__gaussian_load(&g, 0, raw);
         ssdgs__specular_store(g.specular, 1, model->gaussians + i, model->capacity);
     }
 }
@@ -4837,8 +4834,8 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
     return SSDGS_OK;
 }
 
-/* What SORT and BIN work in: of each Gaussian two keys, then a box; of each rank its instances. The camera's
-   is where its colours will be. */
+/* The memory that SORT and BIN of a view work in: two keys of each Gaussian, later its box and, behind all
+   boxes, the instances of each rank. The camera's view borrows that of the colours, which come later. */
 static void *ssdgs__bin_memory(const ssdgs_frame *frame, int view) {
     return view ? ssdgs__view_memory_of(frame, view)->keys.memory : frame->scratch->color.memory;
 }
@@ -8422,8 +8419,10 @@ static size_t ssdgs__ply_setting(const ssdgs__ply_cursor *cursor) {
 /* Where anything else lies. */
 static ssdgs_real *ssdgs__ply_cell(const ssdgs_model *model, size_t row, const ssdgs__ply_cursor *cursor) {
     const size_t width = cursor->field->count ? (size_t)cursor->field->count : 1;
+    const int rest = cursor->word - SSDGS__PLY_REST;
     if (cursor->field->kind == SSDGS__PLY_VERTEX)
-        return model->gaussians + (size_t)cursor->word * model->capacity + row;
+        return model->gaussians +
+               (size_t)(rest < 0 ? cursor->word : SSDGS_HARMONICS + rest) * model->capacity + row;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     return model->globals + first[cursor->field->word / 4] + row * width + (size_t)cursor->index;
@@ -8921,7 +8920,7 @@ static int ssdgs__ply_harmonics(ssdgs__ply *ply) {
     int all = 0, degree = 3, first_unused = 0;
     while (all < 45 && vertex->present[SSDGS__PLY_REST + all]) all++;
     if (!all) return 0;
-    while (degree && 3 * ((degree + 1) * (degree + 1) - 1) != all) degree--;
+    while (degree && 3 * ssdgs__harmonics(degree) != all) degree--;
     if (!degree || ssdgs__ply_has(ply, vertex, "f_rest_45")) {
         ssdgs__note(ply->context, "%s: f_rest is left out: it is not of degree 1, 2 or 3", ply->name);
         return 0;
@@ -8947,20 +8946,20 @@ static int ssdgs__ply_harmonics(ssdgs__ply *ply) {
     }
     ply->interleaved = together > 1.5 * apart;
     if (ply->interleaved)
-        ssdgs__note(ply->context, "%s: f_rest is taken to lie coefficient by coefficient", ply->name);
-    for (int any = 0; degree; degree--) {
-        for (int i = 0; i < all; i++) {
-            const int at = ply->interleaved ? i / 3 : i % ply->harmonics;
-            any |= used[i] && at >= degree * degree - 1;
-        }
-        if (any) break;
+        ssdgs__note(
+            ply->context,
+            "%s: f_rest seems to hold one coefficient after the other, not one channel: it is read so",
+            ply->name);
+    degree = 0;
+    for (int i = 0; i < all; i++) {
+        const int at = ply->interleaved ? i / 3 : i % ply->harmonics;
+        while (used[i] && at >= ssdgs__harmonics(degree)) degree++;
     }
     return degree;
 }
 
 typedef struct ssdgs__ply_target { /* where a word of a row goes: to[row x step] */
     ssdgs__ply_cursor cursor;
-    int word;
     ssdgs_real *to;
     size_t step;
 } ssdgs__ply_target;
@@ -8971,17 +8970,19 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     ssdgs__ply_element *element = ply->known[kind];
     const int vertex = kind == SSDGS__PLY_VERTEX, baked = vertex && model->settings.baked;
     const int planes = baked ? SSDGS_HARMONICS : SSDGS_CHANNELS;
-    const int albedo = baked && element->present[SSDGS_SPECULAR]; /* up to 0.2.5, f_dc was not in kd_ */
-    const int more = ssdgs__harmonics(&model->settings);
+    const int albedo =
+        baked &&
+        element->present[SSDGS_SPECULAR]; /* files up to 0.2.5 have no f_dc in kd_, but what an albedo has */
+    const int more = ssdgs__harmonics(model->settings.harmonics);
     ssdgs__ply_target targets[SSDGS__PLY_WORDS], *target = targets;
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
-        const int at = cursor.word - SSDGS__PLY_REST, file = ply->harmonics;
-        const int c = ply->interleaved ? at % 3 : at / (file + !file),
-                  i = ply->interleaved ? at / 3 : at % (file + !file);
+        const int rest = cursor.word - SSDGS__PLY_REST;
         target->cursor = cursor;
-        target->word = cursor.word;
-        if (baked && at >= 0 && at < 3 * file && i < more) {
+        if (baked && rest >= 0 && rest < 3 * ply->harmonics) {
+            const int c = ply->interleaved ? rest % 3 : rest / ply->harmonics,
+                      i = ply->interleaved ? rest / 3 : rest % ply->harmonics;
+            if (i >= more) continue; /* a band that is 0 */
             target->to = model->gaussians + (size_t)(SSDGS_HARMONICS + c * more + i) * model->capacity;
         } else if (cursor.word < planes && (element->present[cursor.word] || (baked && stats->plain))) {
             target->to = ssdgs__ply_cell(model, 0, &cursor);
@@ -9006,7 +9007,7 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
         }
         if (vertex && !ssdgs__ply_mend(words, planes, stats)) continue;
         const ssdgs__ply_target *bad = targets;
-        while (bad < target && ssdgs__ply_finite(words[bad->word])) bad++;
+        while (bad < target && ssdgs__ply_finite(words[bad->cursor.word])) bad++;
         if (bad < target && vertex) {
             stats->dropped++;
             continue;
@@ -9018,7 +9019,7 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
                                ssdgs__ply_kinds[kind], row, ssdgs__ply_name(&bad->cursor, name));
         }
         for (const ssdgs__ply_target *t = targets; t < target; t++)
-            t->to[kept * t->step] = (ssdgs_real)ssdgs__ply_value(words[t->word]);
+            t->to[kept * t->step] = (ssdgs_real)ssdgs__ply_value(words[t->cursor.word]);
         kept++;
     }
     if (vertex) model->count = (int)kept;
@@ -9131,7 +9132,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
                                                      : SSDGS_CHANNELS);
     if (!result && stats->plain) settings.harmonics = ssdgs__ply_harmonics(ply);
     if (!result && ours) {
-        ply->harmonics = ssdgs__harmonics(&settings);
+        ply->harmonics = ssdgs__harmonics(settings.harmonics);
         result =
             ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, SSDGS__PLY_REST, SSDGS__PLY_REST + 3 * ply->harmonics);
     }
@@ -9433,7 +9434,7 @@ static void ssdgs__average_colour(const ssdgs_model *model, size_t row, uint32_t
 static int ssdgs__ply_written(const ssdgs_settings *s, int kind, int word) {
     if (kind != SSDGS__PLY_VERTEX) return 1;
     if (s->baked && word >= SSDGS_HARMONICS && word < SSDGS_CHANNELS) return 0;
-    return word < SSDGS__PLY_REST + 3 * ssdgs__harmonics(s);
+    return word < SSDGS__PLY_REST + 3 * ssdgs__harmonics(s->harmonics);
 }
 
 static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row, ssdgs__writer *writer) {
@@ -9448,11 +9449,9 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
             const double value = ssdgs__number_get(cursor.field->type, (const unsigned char *)settings +
                                                                            ssdgs__ply_setting(&cursor));
             *word = cursor.field->type == 'i' ? (uint32_t)(int)value : ssdgs__ply_bits(value);
-        } else if (kind != SSDGS__PLY_VERTEX || cursor.word < SSDGS_CHANNELS) {
+        } else if (kind != SSDGS__PLY_VERTEX || cursor.word < SSDGS_CHANNELS ||
+                   cursor.word >= SSDGS__PLY_REST) {
             *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
-        } else if (cursor.word >= SSDGS__PLY_REST) {
-            const size_t plane = (size_t)(cursor.word - SSDGS__PLY_REST + SSDGS_HARMONICS);
-            *word = ssdgs__ply_bits((double)model->gaussians[plane * model->capacity + row]);
         }
         ssdgs__writer_word(writer, *word);
     }
@@ -14323,7 +14322,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
    up to degree 3, with the signs of the published 3D Gaussian splatting. rows: f_dc (3), then all others of
    red, of green, of blue. */
 SSDGS__FN void F(harmonics)(const R *position, const R *rows, int degree, const R *eye, R *out) {
-    const int more = (degree + 1) * (degree + 1) - 1;
+    const int more = ssdgs__harmonics(degree);
     for (int s = 0; s < SSDGS__BLOCK; s += SSDGS__VW) {
         V y[15], d[3], length = V_SET(0);
         for (int i = 0; i < 3 && more; i++) {

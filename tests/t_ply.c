@@ -667,7 +667,7 @@ static void test_harmonics(void) {
                 sprintf(line, "%d", ROWS);
                 bytes b = ascii(line, properties, (const char *)rows.data);
                 ssdgs_load_stats stats;
-                CHECK(tells(&b, &stats, "f_rest is taken to lie coefficient by coefficient") ==
+                CHECK(tells(&b, &stats, "f_rest seems to hold one coefficient after the other") ==
                       (mixed && bands > 0));
                 ssdgs_model *model = NULL, *back = NULL;
                 CHECK(load(b.data, b.size, &model, &stats) == SSDGS_OK && !stats.dropped);
