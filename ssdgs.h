@@ -3033,10 +3033,8 @@ static void ssdgs__gaussian_raw(const ssdgs_model *model, size_t index, ssdgs_re
     ssdgs__gaussian_reset(raw, 1, 0);
     for (int c = 0; c < (baked ? SSDGS_HARMONICS : SSDGS_CHANNELS); c++)
         raw[c] = model->gaussians[(size_t)c * model->capacity + index];
-    for (int c = SSDGS_DIFFUSE; c < SSDGS_HARMONICS && baked; c++) {
-        const double color = 0.5 + SSDGS__HARMONIC * (double)raw[c];
-        raw[c] = (ssdgs_real)ssdgs__softplus_inverse(color > 0 ? color : 0);
-    }
+    for (int c = SSDGS_DIFFUSE; c < SSDGS_HARMONICS && baked; c++)
+        raw[c] = (ssdgs_real)ssdgs__softplus_inverse(0.5 + SSDGS__HARMONIC * (double)raw[c]);
 }
 
 static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *function, int index,

@@ -699,6 +699,22 @@ static void test_harmonics(void) {
     bytes b = ascii("0", properties, "");
     CHECK(tells(&b, &stats, "f_rest is left out: it is not of degree 1, 2 or 3"));
     free(b.data);
+    for (int first = 0; first < 15; first++) { /* one value of red alone keeps its band */
+        char row[200] = POINT "0 0 0";
+        ssdgs_model *model = NULL;
+        strcpy(properties, DC);
+        for (int i = 0; i < 45; i++) {
+            sprintf(properties + strlen(properties), "property float f_rest_%d\n", i);
+            strcat(row, i == first ? " 1" : " 0");
+        }
+        b = ascii("1", properties, strcat(row, "\n"));
+        CHECK(load(b.data, b.size, &model, NULL) == SSDGS_OK &&
+              model->settings.harmonics == (first < 3   ? 1
+                                            : first < 8 ? 2
+                                                        : 3));
+        ssdgs_model_destroy(model);
+        free(b.data);
+    }
     strcpy(properties, DC);
     for (int i = 0; i < 9; i++) sprintf(properties + strlen(properties), "property float f_rest_%d\n", i);
     b = ascii("3", properties,
