@@ -21,7 +21,7 @@ PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
 HEADERS = ssdgs.h $(wildcard examples/*.h) tests/test.h tests/scene.h tests/kernels.h
-EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/check $(BUILD)/ball $(BUILD)/bench
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/bench
 SOURCES = $(filter-out tests/t_gpu.c,$(wildcard tests/t_*.c)) # which is `make test-gpu`
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
@@ -31,7 +31,7 @@ RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 MODEL = examples/data/waxcow.ply
 
-all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/view, build/check, build/ball, build/bench
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/view, build/check, build/ball, build/unbake, build/bench
 
 demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
@@ -88,7 +88,7 @@ $(BUILD)/builds.log: %.log: $(OBJECTS) $(BUILD)/gpu_shaders.h
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
 $(BUILD)/shown.log: %.log: | $(BUILD)
 	@sh tests/shown.sh $(KEEP_LOG)
-$(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/show
+$(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/show
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
 test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.html in headless Chromium, and make web's page where emscripten is; needs node and chromium

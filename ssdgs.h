@@ -156,9 +156,9 @@ MACROS, defined before the header; those with * in every file that includes it
 
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
-  adopt.h mends edited models, olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in
-  OpenGL 4.3. Nothing finds cameras or lights (options.refine corrects small errors), traces light between
-  objects, undistorts lenses, or compresses models.
+  unbake.h models that take light of plain splats, adopt.h mends edited models, olat.h reads datasets,
+  images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3. Nothing finds cameras or lights (options.refine
+  corrects small errors), traces light between objects, undistorts lenses, or compresses models.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)

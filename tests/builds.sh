@@ -30,10 +30,10 @@ compiles "a name that Windows' headers take" tests/library.c "$@" -fsyntax-only 
 printf '#define R 17\n#define V 18\n#define F 19\n#define VADD 20\n#define SSDGS_IMPLEMENTATION\n#include "ssdgs.h"
 extern int names[R == 17 && V == 18 && F == 19 && VADD == 20 ? 1 : -1];\n' >"$build/names.c"
 compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax-only
-for example in train relight minimal engine export view check ball bench; do # each is a program of its own
+for example in train relight minimal engine export view check ball unbake bench; do # each is a program of its own
     compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only
 done
-for header in files json images flip olat judge reduce sky; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
+for header in files json images flip olat judge reduce sky unbake; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
     case $header in files | json) : ;; *) echo '#include "ssdgs.h"' ;; esac >"$build/header.c"
     printf '#include "examples/%s.h"\nint main(void) { return 0; }\n' "$header" >>"$build/header.c"
     compiles "$header.h alone" "$build/header.c" "$@" -I.

@@ -371,6 +371,19 @@ check "engine --frames 2abc" says 2 "^usage: engine" engine --frames 2abc
 check "--light a b c" says 2 "^usage: export" export_of "$model" "$out/unlit" --light a b c
 check "ball" says 1 "r_000.png: " "$build/ball" --focal 500 20 20 10 "$set/test/r_000.png"
 
+# a plain splat of the model, lit again
+"$build/export" "$model" "$out/baked" --keep >/dev/null 2>&1
+check "unbake" says 0 "lit.ply: [0-9]* Gaussians that take light" "$build/unbake" "$out/baked.ply" -o "$out/lit.ply" --ambient 1,1,1 --medium 20,1 --roughness 0.4 --f0 0.05
+check "lit" says 0 "4 images" "$build/relight" "$out/lit.ply" "$set" --out "$out/lit" --threads 1
+check "unbake a model" says 1 "takes light as it is" "$build/unbake" "$model" -o "$out/lit2.ply"
+check "and writes nothing" test ! -e "$out/lit2.ply"
+check "unbake onto itself" says 1 "baked.ply" "$build/unbake" "$out/baked.ply" -o "$out/baked.ply"
+check "unbake nothing" says 1 "no.ply" "$build/unbake" "$out/no.ply" -o "$out/lit2.ply"
+for wrong in "--ambient 1,1" "--ambient 1,1,1," "--ambient -1,1,1" "--medium nan,1" "--roughness" "--lit 1" "more.ply"; do
+    check "unbake $wrong" says 2 "^usage: unbake" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" $wrong
+done
+check "unbake --roughness 2" says 1 "roughness" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" --roughness 2
+
 rm -rf "$out"
 echo "$passed passed, $failed failed"
 [ $failed -eq 0 ]

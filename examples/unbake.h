@@ -1,0 +1,521 @@
+/* unbake.h - a plain splat becomes a model that takes light. MIT, see ssdgs.h.
+
+   #define SSDGS_STAGES
+   #include "ssdgs.h"
+   #include "unbake.h"
+   ...
+   ssdgs_result result = unbake_model(context, &model, NULL);
+
+   HOW  Where each Gaussian sees the sky, from 32 directions, says on which side of it the air is: its
+   shortest axis points there and becomes its normal. Its colour, divided by the share of the sky that it
+   sees, becomes its albedo, averaged over neighbours of its hue. What things stand on was photographed from
+   above: no direction from below it counts.
+
+   HOW WELL  Trained models, baked under an even sky and lit again by the lamps of their test photographs, had
+   25 dB where things are matt, 34 where they are of wax that options tell, and 22 where they are of metal,
+   which no colour tells. It takes some seconds for 150,000 Gaussians, so save the result. Its memory comes
+   from malloc(). */
+
+#ifndef UNBAKE_H
+#define UNBAKE_H
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define UNBAKE__SKY 32     /* directions from which it is seen */
+#define UNBAKE__AT_ONCE 4  /* of them, in one frame */
+#define UNBAKE__NEAR 24    /* neighbours */
+#define UNBAKE__ROUNDS 10  /* of averaging albedos over them */
+#define UNBAKE__CHUNK 256  /* Gaussians of a task */
+#define UNBAKE__FLAT 0.85  /* cosine of the angle to a plane's normal within which a Gaussian lies in it */
+#define UNBAKE__THICK 0.06 /* of the model's size: half a plane's thickness */
+#define UNBAKE__BELOW 0.3  /* sine of the angle below the horizon from where what things stand on is seen */
+#define UNBAKE__LEAST 0.05 /* share of the sky that a Gaussian sees, at least */
+#define UNBAKE__MOST 0.95  /* of the surface: what sees or reflects more counts as what is at this share */
+
+/* What is known of a splat beside its file. */
+typedef struct unbake_options {
+    ssdgs_real ambient[9][3]; /* irradiance under which it was photographed, as ssdgs_render_options has it;
+                                 0: even, and of such strength that what is white is 0.9 */
+    ssdgs_real scattering[3]; /* of 1 world unit, as settings.medium has them: all of it is wax or skin; */
+    ssdgs_real absorption[3]; /* 0: it is opaque; 0 */
+    ssdgs_real roughness;     /* of its highlights, 0.01 .. 1; 0: it has none; 0 */
+    ssdgs_real f0;            /* what it reflects at normal incidence; 0.04 */
+} unbake_options;
+static inline unbake_options unbake_options_default(void) {
+    unbake_options options;
+    memset(&options, 0, sizeof options);
+    options.f0 = (ssdgs_real)0.04;
+    return options;
+}
+
+/* What is found of a Gaussian. */
+typedef struct unbake__splat {
+    float position[3], axis[3]; /* world; axis: its shortest */
+    float flat, weight;         /* 0 .. 1: how much shorter that is; opacity x area */
+    float normal[3], share;     /* share: of an even sky */
+    float color[3], hue[2];     /* linear; hue: shares of red and green */
+} unbake__splat;
+
+typedef struct unbake__state {
+    const ssdgs_model *plain;
+    const unbake_options *options;
+    int count, batch, told;            /* batch: the first direction at work; told: options.ambient is */
+    ssdgs_real low[3], high[3];        /* bounds */
+    double most;                       /* sky that a Gaussian sees, but for a few */
+    double size;                       /* their longest side */
+    double sky[UNBAKE__SKY][3];        /* directions, even over the sphere */
+    unsigned char counts[UNBAKE__SKY]; /* 0: nothing was photographed from there */
+    unsigned char *seen;               /* (UNBAKE__SKY, count) how well, 255: fully */
+    unbake__splat *splat;              /* (count) */
+    uint32_t *tree, *near_by;          /* (count) a k-d tree; (count, UNBAKE__NEAR) */
+    unsigned char *across;             /* (count) the axis along which the tree is cut */
+    float *tells;                      /* (count, UNBAKE__NEAR) shares of the neighbours, itself one */
+    float *albedo, *averaged;          /* (count, 3) */
+} unbake__state;
+
+static inline double unbake__dot(const double a[3], const float b[3]) {
+    return a[0] * (double)b[0] + a[1] * (double)b[1] + a[2] * (double)b[2];
+}
+
+/* Stage WALK keeps what the Gaussians get of each light. */
+static inline ssdgs_result unbake__walk(void *user, ssdgs_frame *frame) {
+    unbake__state *u = (unbake__state *)user;
+    const ssdgs_result result = ssdgs_stage_cpu(frame, SSDGS_STAGE_WALK);
+    for (int light = 0; light < frame->light_count && !result; light++)
+        for (int i = 0; i < u->count; i++) {
+            const double passed = (double)frame->visibility[(size_t)light * (size_t)frame->count + (size_t)i];
+            u->seen[(size_t)(u->batch + light) * (size_t)u->count + (size_t)i] =
+                (unsigned char)(passed > 0 ? 255 * (passed < 1 ? passed : 1) + 0.5 : 0);
+        }
+    return result;
+}
+
+static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    const ssdgs_model_view from = ssdgs_model_peek(u->plain);
+    const ssdgs_render_options coarse = ssdgs_render_options_preview();
+    ssdgs_gpu_hook hook;
+    ssdgs_context_desc desc;
+    ssdgs_context *own = NULL;
+    ssdgs_model *model = NULL;
+    ssdgs_scene *scene = NULL;
+    memset(&hook, 0, sizeof hook);
+    memset(&desc, 0, sizeof desc);
+    hook.stage[SSDGS_STAGE_WALK] = unbake__walk;
+    hook.user = u;
+    desc.gpu = &hook;
+    desc.threads = ssdgs_context_threads(context);
+    desc.isa = ssdgs_context_isa(context);
+    settings.terms = SSDGS_SHADOW_TERM;
+    settings.scattering.layers = settings.shadow.layers = settings.transport = 0;
+    settings.light_map.bias /= 2; /* thin things have two sides */
+    ssdgs_result result = ssdgs_context_create(&desc, &own);
+    settings.length_unit = u->size > 0 ? (ssdgs_real)(u->size / 2) : 1;
+    if (!result) result = ssdgs_model_create(own, &settings, u->count, &model);
+    if (!result) result = ssdgs_scene_create(own, &scene);
+    if (!result) {
+        const ssdgs_model_view to = ssdgs_model_arrays(model);
+        for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
+            memcpy(to.gaussians + c * to.stride, from.gaussians + c * from.stride,
+                   (size_t)u->count * sizeof *to.gaussians);
+    }
+    const ssdgs_object object = ssdgs_object_default(model);
+    for (u->batch = 0; u->batch < UNBAKE__SKY && !result; u->batch += UNBAKE__AT_ONCE) {
+        ssdgs_light lights[UNBAKE__AT_ONCE];
+        for (int i = 0; i < UNBAKE__AT_ONCE; i++) {
+            static const ssdgs_real even[3] = {1, 1, 1};
+            const double *d = u->sky[u->batch + i];
+            const ssdgs_real along[3] = {(ssdgs_real)-d[0], (ssdgs_real)-d[1], (ssdgs_real)-d[2]};
+            lights[i] = ssdgs_light_directional(along, even);
+        }
+        result = ssdgs_scene_light(scene, &object, 1, lights, UNBAKE__AT_ONCE, &coarse);
+    }
+    ssdgs_scene_destroy(scene);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(own);
+    return result;
+}
+
+/* Shape and colour. What is not finite weighs nothing. */
+static inline ssdgs_result unbake__read(unbake__state *u) {
+    const int linear = ssdgs_model_settings(u->plain)->transfer == SSDGS_TRANSFER_SRGB;
+    for (int i = 0; i < u->count; i++) {
+        unbake__splat *s = u->splat + i;
+        ssdgs_gaussian g;
+        const ssdgs_result result = ssdgs_model_get(u->plain, i, &g);
+        if (result) return result;
+        const double w = (double)g.rotation[0], x = (double)g.rotation[1], y = (double)g.rotation[2],
+                     z = (double)g.rotation[3];
+        const double axis[3][3] = {{1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)},
+                                   {2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)},
+                                   {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)}};
+        int least = 0;
+        double sum = 1e-12;
+        for (int c = 1; c < 3; c++) least = g.scale[c] < g.scale[least] ? c : least;
+        const double a = (double)g.scale[(least + 1) % 3], b = (double)g.scale[(least + 2) % 3];
+        s->flat = (float)(1 - (double)g.scale[least] / (a < b ? a : b));
+        s->weight = (float)((double)g.opacity * a * b);
+        int finite = s->flat - s->flat == 0 && s->weight - s->weight == 0;
+        for (int c = 0; c < 3; c++) {
+            const double stored = (double)g.diffuse[c];
+            s->position[c] = (float)g.position[c];
+            s->axis[c] = (float)axis[least][c];
+            s->color[c] = (float)(linear ? stored : (double)ssdgs_srgb_decode((ssdgs_real)stored));
+            sum += (double)s->color[c];
+            finite &= s->position[c] - s->position[c] == 0 && s->axis[c] - s->axis[c] == 0 &&
+                      s->color[c] - s->color[c] == 0;
+        }
+        if (!finite) memset(s, 0, sizeof *s);
+        for (int c = 0; c < 2; c++) s->hue[c] = finite ? (float)((double)s->color[c] / sum) : 0;
+    }
+    return SSDGS_OK;
+}
+
+/* How flat it looks along a direction: the share of what is seen that lies in a plane across it. `plane` gets
+   that plane's normal, `middle` its place along the direction. */
+static inline double unbake__plane(const unbake__state *u, int k, double plane[3], double *middle) {
+    const unsigned char *seen = u->seen + (size_t)k * (size_t)u->count;
+    double all = 1e-30, flat = 1e-30, within = 0;
+    *middle = 0;
+    memset(plane, 0, 3 * sizeof *plane);
+    for (int pass = 0; pass < 2; pass++) {
+        for (int i = 0; i < u->count; i++) {
+            const unbake__splat *s = u->splat + i;
+            const double along = unbake__dot(u->sky[k], s->axis), at = unbake__dot(u->sky[k], s->position);
+            const double weight = (double)s->weight * seen[i] * fabs(along);
+            if (!pass) all += weight;
+            if (fabs(along) < UNBAKE__FLAT) continue;
+            if (!pass) flat += weight, *middle += weight * at;
+            else if (fabs(at - *middle) < UNBAKE__THICK * u->size) {
+                within += weight;
+                for (int c = 0; c < 3; c++) plane[c] += weight * (along < 0 ? -1 : 1) * (double)s->axis[c];
+            }
+        }
+        if (!pass) *middle /= flat;
+    }
+    const double length = sqrt(plane[0] * plane[0] + plane[1] * plane[1] + plane[2] * plane[2]) + 1e-30;
+    for (int c = 0; c < 3; c++) plane[c] /= length;
+    return within / all;
+}
+
+/* Things that stand on something were photographed from above, so directions from below do not count. It is
+   what looks flattest from outside, where there is air on its other side, too. */
+static inline void unbake__stand(unbake__state *u) {
+    double best = 0, down[3] = {0, 0, 0}, middle = 0, sides[2] = {0, 0};
+    int from = 0;
+    for (int k = 0; k < UNBAKE__SKY; k++) {
+        double plane[3], at;
+        const double share = unbake__plane(u, k, plane, &at);
+        if (share <= best) continue;
+        best = share, from = k, middle = at;
+        memcpy(down, plane, sizeof down);
+    }
+    for (int i = 0; i < u->count; i++) {
+        const unbake__splat *s = u->splat + i;
+        if (fabs(unbake__dot(down, s->axis)) < UNBAKE__FLAT ||
+            fabs(unbake__dot(u->sky[from], s->position) - middle) >= UNBAKE__THICK * u->size)
+            continue;
+        for (int k = 0; k < UNBAKE__SKY; k++) {
+            const double *d = u->sky[k], along = down[0] * d[0] + down[1] * d[1] + down[2] * d[2];
+            sides[along < 0] +=
+                (double)s->weight * fabs(along) * u->seen[(size_t)k * (size_t)u->count + (size_t)i];
+        }
+    }
+    const int stands = best > 0.4 && sides[1] > 0.25 * sides[0];
+    for (int k = 0; k < UNBAKE__SKY; k++) {
+        const double *d = u->sky[k];
+        u->counts[k] = !stands || down[0] * d[0] + down[1] * d[1] + down[2] * d[2] < UNBAKE__BELOW;
+    }
+}
+
+/* A Gaussian's normal and how much of the sky it sees. */
+static inline void unbake__side_task(void *data, int chunk) {
+    unbake__state *u = (unbake__state *)data;
+    for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
+        unbake__splat *s = u->splat + i;
+        double sky[3] = {0, 0, 0}, open[3] = {0, 0, 0}, side = 0, n[3], length = 1e-30, share = 0;
+        for (int k = 0; k < UNBAKE__SKY; k++) {
+            const double seen = u->seen[(size_t)k * (size_t)u->count + (size_t)i] / (255.0 * UNBAKE__SKY);
+            for (int c = 0; c < 3; c++) sky[c] += seen * u->sky[k][c];
+            if (!u->counts[k]) continue;
+            side += seen * unbake__dot(u->sky[k], s->axis);
+            for (int c = 0; c < 3; c++) open[c] += seen * u->sky[k][c];
+        }
+        const double away = sqrt(open[0] * open[0] + open[1] * open[1] + open[2] * open[2]) + 1e-9;
+        for (int c = 0; c < 3; c++) {
+            n[c] = (double)s->flat * (side < 0 ? -1 : 1) * (double)s->axis[c] +
+                   (1 - (double)s->flat) * open[c] / away;
+            length += n[c] * n[c];
+        }
+        for (int c = 0; c < 3; c++) {
+            s->normal[c] = (float)(n[c] / sqrt(length));
+            share += 4 * sky[c] * (double)s->normal[c]; /* 1 on an open plane */
+        }
+        s->share = (float)share;
+    }
+}
+
+/* Its albedo, in the light that comes to it. What sees the most sky, but for a few, sees all of it. */
+static inline void unbake__albedo_task(void *data, int chunk) {
+    unbake__state *u = (unbake__state *)data;
+    for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
+        unbake__splat *s = u->splat + i;
+        const double share = (double)s->share / u->most, x = (double)s->normal[0], y = (double)s->normal[1],
+                     z = (double)s->normal[2];
+        const double term[9] = {1, y, z, x, x * y, y * z, 3 * z * z - 1, x * z, x * x - y * y};
+        s->share = (float)(share < UNBAKE__LEAST ? UNBAKE__LEAST : share > 1 ? 1 : share);
+        for (int c = 0; c < 3; c++) {
+            double light = u->told ? 0 : 1;
+            for (int j = 0; j < 9; j++) light += term[j] * (double)u->options->ambient[j][c];
+            u->albedo[3 * (size_t)i + (size_t)c] =
+                light > 0 ? (float)(3.14159265358979 * (double)s->color[c] / (light * (double)s->share)) : 0;
+        }
+    }
+}
+
+/* Puts the middle one of tree[from .. to) along an axis in its place, smaller ones before it. */
+static inline void unbake__middle(const unbake__state *u, int from, int to, int axis) {
+    const int middle = (from + to) / 2;
+    for (to--; from < to;) {
+        const float pivot = u->splat[u->tree[middle]].position[axis];
+        int i = from, j = to;
+        do {
+            while (u->splat[u->tree[i]].position[axis] < pivot) i++;
+            while (pivot < u->splat[u->tree[j]].position[axis]) j--;
+            if (i > j) break;
+            const uint32_t swapped = u->tree[i];
+            u->tree[i++] = u->tree[j];
+            u->tree[j--] = swapped;
+        } while (i <= j);
+        if (j < middle) from = i;
+        if (middle < i) to = j;
+    }
+}
+
+/* Cuts tree[from .. to) where it is longest, and so on: a node is the middle of its part. */
+static inline void unbake__cut(unbake__state *u, int from, int to) {
+    while (to - from > 1) {
+        int axis = 0;
+        float longest = -1;
+        for (int c = 0; c < 3; c++) {
+            float low = u->splat[u->tree[from]].position[c], high = low;
+            for (int i = from + 1; i < to; i++) {
+                const float x = u->splat[u->tree[i]].position[c];
+                low = x < low ? x : low;
+                high = x > high ? x : high;
+            }
+            if (high - low > longest) longest = high - low, axis = c;
+        }
+        unbake__middle(u, from, to, axis);
+        u->across[(from + to) / 2] = (unsigned char)axis;
+        unbake__cut(u, from, (from + to) / 2);
+        from = (from + to) / 2 + 1;
+    }
+}
+
+/* Who is nearest, nearest first. */
+typedef struct unbake__near {
+    const float *at;
+    uint32_t *who;
+    float distance2[UNBAKE__NEAR];
+    int count;
+} unbake__near;
+static inline void unbake__search(const unbake__state *u, int from, int to, unbake__near *near_by) {
+    while (from < to) {
+        const int middle = (from + to) / 2, axis = u->across[middle];
+        const float *p = u->splat[u->tree[middle]].position;
+        float d2 = 0;
+        for (int c = 0; c < 3; c++) d2 += (p[c] - near_by->at[c]) * (p[c] - near_by->at[c]);
+        if (near_by->count < UNBAKE__NEAR || d2 < near_by->distance2[UNBAKE__NEAR - 1]) {
+            int j = near_by->count < UNBAKE__NEAR ? near_by->count++ : UNBAKE__NEAR - 1;
+            for (; j && d2 < near_by->distance2[j - 1]; j--) {
+                near_by->distance2[j] = near_by->distance2[j - 1];
+                near_by->who[j] = near_by->who[j - 1];
+            }
+            near_by->distance2[j] = d2;
+            near_by->who[j] = u->tree[middle];
+        }
+        const float beyond = near_by->at[axis] - p[axis];
+        unbake__search(u, beyond < 0 ? from : middle + 1, beyond < 0 ? middle : to, near_by);
+        if (near_by->count == UNBAKE__NEAR && beyond * beyond > near_by->distance2[UNBAKE__NEAR - 1]) return;
+        if (beyond < 0) from = middle + 1;
+        else to = middle;
+    }
+}
+
+/* Neighbours, and what each tells of a Gaussian's albedo: those of its hue that see much of the sky most. */
+static inline void unbake__near_task(void *data, int chunk) {
+    unbake__state *u = (unbake__state *)data;
+    for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
+        const size_t first = (size_t)i * UNBAKE__NEAR;
+        const unbake__splat *s = u->splat + i;
+        double sum = 0;
+        unbake__near near_by;
+        near_by.at = s->position;
+        near_by.who = u->near_by + first;
+        near_by.count = 0;
+        unbake__search(u, 0, u->count, &near_by);
+        for (; near_by.count < UNBAKE__NEAR; near_by.count++) near_by.who[near_by.count] = (uint32_t)i;
+        for (size_t j = first; j < first + UNBAKE__NEAR; j++) {
+            const unbake__splat *o = u->splat + u->near_by[j];
+            const double red = (double)(s->hue[0] - o->hue[0]), green = (double)(s->hue[1] - o->hue[1]);
+            u->tells[j] = (float)(((double)o->weight + 1e-12) * (double)(o->share * o->share) *
+                                  exp(-450 * (red * red + green * green + red * green)));
+            sum += (double)u->tells[j];
+        }
+        for (size_t j = first; j < first + UNBAKE__NEAR; j++)
+            u->tells[j] = sum > 0 ? (float)((double)u->tells[j] / sum) : 1.f / UNBAKE__NEAR;
+    }
+}
+
+/* Albedos become means over neighbours. */
+static inline void unbake__average_task(void *data, int chunk) {
+    const unbake__state *u = (const unbake__state *)data;
+    for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
+        float sum[3] = {0, 0, 0};
+        for (size_t j = (size_t)i * UNBAKE__NEAR; j < ((size_t)i + 1) * UNBAKE__NEAR; j++)
+            for (size_t c = 0; c < 3; c++) sum[c] += u->tells[j] * u->albedo[3 * (size_t)u->near_by[j] + c];
+        memcpy(u->averaged + 3 * (size_t)i, sum, sizeof sum);
+    }
+}
+
+static inline int unbake__compare(const void *a, const void *b) {
+    const float x = *(const float *)a, y = *(const float *)b;
+    return x < y ? -1 : x > y;
+}
+
+/* Of pairs (count) of a value and its weight, which it sorts: the value that all but few are below. */
+static inline double unbake__most(float *pairs, int count) {
+    double all = 0, sum = 0;
+    int at = 0;
+    for (int i = 0; i < count; i++) all += (double)pairs[2 * (size_t)i + 1];
+    qsort(pairs, (size_t)count, 2 * sizeof *pairs, unbake__compare);
+    while (at < count - 1 && sum < UNBAKE__MOST * all) sum += (double)pairs[2 * (size_t)at++ + 1];
+    return count ? (double)pairs[2 * (size_t)at] : 0;
+}
+
+static inline ssdgs_result unbake__find(unbake__state *u, ssdgs_context *context) {
+    const int chunks = (u->count + UNBAKE__CHUNK - 1) / UNBAKE__CHUNK;
+    for (int k = 0; k < UNBAKE__SKY; k++) { /* on a spiral around the sphere */
+        const double z = 1 - (2 * k + 1.0) / UNBAKE__SKY, across = sqrt(1 - z * z), turn = 2.39996323 * k;
+        u->sky[k][0] = across * cos(turn);
+        u->sky[k][1] = across * sin(turn);
+        u->sky[k][2] = z;
+    }
+    ssdgs_result result = unbake__look(u, context);
+    if (!result) result = unbake__read(u);
+    if (result) return result;
+    unbake__stand(u);
+    result = ssdgs_context_run(context, chunks, unbake__side_task, u);
+    for (int i = 0; i < u->count; i++) {
+        u->averaged[2 * (size_t)i] = u->splat[i].share;
+        u->averaged[2 * (size_t)i + 1] = u->splat[i].weight * u->splat[i].share;
+    }
+    u->most = unbake__most(u->averaged, u->count);
+    if (!(u->most > 0)) u->most = 1;
+    if (!result) result = ssdgs_context_run(context, chunks, unbake__albedo_task, u);
+    for (int i = 0; i < u->count; i++) u->tree[i] = (uint32_t)i;
+    unbake__cut(u, 0, u->count);
+    if (!result) result = ssdgs_context_run(context, chunks, unbake__near_task, u);
+    for (int round = 0; round < UNBAKE__ROUNDS && !result; round++) {
+        result = ssdgs_context_run(context, chunks, unbake__average_task, u);
+        float *last = u->albedo;
+        u->albedo = u->averaged;
+        u->averaged = last;
+    }
+    return result;
+}
+
+/* The model: its Gaussians are the splat's, bit for bit. */
+static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context, ssdgs_model **out) {
+    const unbake_options *o = u->options;
+    const ssdgs_settings *plain = ssdgs_model_settings(u->plain);
+    const ssdgs_model_view from = ssdgs_model_peek(u->plain);
+    double white;
+    ssdgs_settings settings = ssdgs_settings_default();
+    int translucent = 0;
+    for (int c = 0; c < 3; c++) translucent |= o->scattering[c] > 0;
+    settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM | (translucent ? SSDGS_SCATTERING_TERM : 0) |
+                     (o->roughness > 0 ? SSDGS_SPECULAR_TERM : 0);
+    settings.scattering.layers = settings.shadow.layers = 0;
+    settings.transport = translucent;
+    memcpy(settings.medium.scattering, o->scattering, sizeof o->scattering);
+    memcpy(settings.medium.absorption, o->absorption, sizeof o->absorption);
+    settings.pixel_variance = plain->pixel_variance;
+    settings.placement = plain->placement;
+    memcpy(settings.origin, plain->origin, sizeof plain->origin);
+    for (int c = 0; c < 3; c++) settings.centre[c] = (u->low[c] + u->high[c]) / 2;
+    settings.length_unit = u->size > 0 ? (ssdgs_real)(u->size / 2) : 1;
+    ssdgs_result result = ssdgs_model_create(context, &settings, u->count, out);
+    for (int i = 0; i < u->count; i++) { /* by the brightest channel */
+        const float *a = u->albedo + 3 * (size_t)i;
+        u->averaged[2 * (size_t)i] = a[0] > a[1] ? a[0] > a[2] ? a[0] : a[2] : a[1] > a[2] ? a[1] : a[2];
+        u->averaged[2 * (size_t)i + 1] = u->splat[i].weight * u->splat[i].share;
+    }
+    white = unbake__most(u->averaged, u->count);
+    for (int i = 0; i < u->count && !result; i++) {
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        if (o->roughness > 0) {
+            const ssdgs_real both[2] = {o->roughness, o->roughness};
+            result = ssdgs_gaussian_mirror(*out, both, &g);
+            g.f0 = o->f0;
+        }
+        for (int c = 0; c < 3; c++) {
+            double albedo = (double)u->albedo[3 * (size_t)i + (size_t)c];
+            albedo = albedo < white ? albedo : white;
+            if (!u->told && white > 0) albedo *= 0.9 / white;
+            g.normal[c] = (ssdgs_real)u->splat[i].normal[c];
+            g.diffuse[c] = (ssdgs_real)(translucent ? albedo / 2 : albedo);
+            g.scattering[c] = translucent ? g.diffuse[c] : 0;
+        }
+        g.softness = (ssdgs_real)0.2;
+        if (!result) result = ssdgs_model_set(*out, i, &g);
+    }
+    if (result) return result;
+    const ssdgs_model_view to = ssdgs_model_arrays(*out);
+    for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
+        memcpy(to.gaussians + c * to.stride, from.gaussians + c * from.stride,
+               (size_t)u->count * sizeof *to.gaussians);
+    return SSDGS_OK;
+}
+
+/* Makes of *model, a plain splat (settings.baked), one that takes light, on the same context, destroys it and
+   puts the new one in its place. Its own light is gone. options NULL = default. The same bits on any number
+   of threads. A model that an object uses must not be given. ERR_ARGUMENT: it is not baked, or an option is
+   out of range. ERR_MEMORY. Where it fails, *model is as it was. */
+static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model **model,
+                                        const unbake_options *options) {
+    const unbake_options none = unbake_options_default();
+    unbake__state u;
+    ssdgs_model *lit = NULL;
+    memset(&u, 0, sizeof u);
+    if (!context || !model || !*model || !ssdgs_model_settings(*model)->baked) return SSDGS_ERR_ARGUMENT;
+    u.options = options ? options : &none;
+    for (int i = 0; i < 27; i++) u.told |= u.options->ambient[i / 3][i % 3] != 0;
+    u.plain = *model;
+    u.count = ssdgs_model_count(*model);
+    const size_t n = (size_t)u.count + 1; /* none is no failure */
+    u.seen = (unsigned char *)calloc(n, UNBAKE__SKY);
+    u.splat = (unbake__splat *)calloc(n, sizeof *u.splat);
+    u.tree = (uint32_t *)calloc(n, sizeof *u.tree);
+    u.near_by = (uint32_t *)calloc(n, UNBAKE__NEAR * sizeof *u.near_by);
+    u.tells = (float *)calloc(n, UNBAKE__NEAR * sizeof *u.tells);
+    u.across = (unsigned char *)calloc(n, 1);
+    u.albedo = (float *)calloc(n, 3 * sizeof *u.albedo);
+    u.averaged = (float *)calloc(n, 3 * sizeof *u.averaged);
+    ssdgs_result result =
+        u.seen && u.splat && u.tree && u.near_by && u.tells && u.across && u.albedo && u.averaged
+            ? ssdgs_model_bounds(*model, u.low, u.high)
+            : SSDGS_ERR_MEMORY;
+    for (int c = 0; c < 3 && !result; c++) u.size = fmax(u.size, (double)(u.high[c] - u.low[c]));
+    if (!result) result = unbake__find(&u, context);
+    if (!result) result = unbake__make(&u, context, &lit);
+    free(u.seen), free(u.splat), free(u.tree), free(u.near_by), free(u.tells), free(u.across);
+    free(u.albedo), free(u.averaged);
+    ssdgs_model_destroy(result ? lit : *model);
+    if (!result) *model = lit;
+    return result;
+}
+#endif

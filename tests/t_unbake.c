@@ -1,0 +1,240 @@
+/* Plain splats that take light: sides and albedos of bodies that are known, what is told, the same bits on
+ * any threads. */
+#define SSDGS_IMPLEMENTATION
+#include "../ssdgs.h"
+#include "../examples/unbake.h"
+#include "test.h"
+
+enum { BALL = 1500, SIDE = 30, PLATE = 2 * SIDE * SIDE };
+
+static ssdgs_context *open_context(int threads) {
+    ssdgs_context_desc desc;
+    ssdgs_context *context = NULL;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = threads;
+    if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+    return context;
+}
+
+static ssdgs_model *plain_model(ssdgs_context *context, int count) {
+    ssdgs_settings settings = ssdgs_settings_default();
+    ssdgs_model *model = NULL;
+    settings.baked = 1;
+    settings.transfer = SSDGS_TRANSFER_NONE;
+    if (!CHECK(!ssdgs_model_create(context, &settings, count, &model))) exit(1);
+    return model;
+}
+
+/* A flat Gaussian of that normal and linear colour. */
+static void put(ssdgs_model *model, int index, const double at[3], const double normal[3], double width,
+                const double color[3]) {
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    const int turned = normal[2] < -0.999; /* z turned to the normal, or half a turn about x */
+    g.rotation[0] = (ssdgs_real)(turned ? 0 : 1 + normal[2]);
+    g.rotation[1] = (ssdgs_real)(turned ? 1 : -normal[1]);
+    g.rotation[2] = (ssdgs_real)(turned ? 0 : normal[0]);
+    g.rotation[3] = 0;
+    g.opacity = (ssdgs_real)0.95;
+    for (int c = 0; c < 3; c++) {
+        g.position[c] = (ssdgs_real)at[c];
+        g.scale[c] = (ssdgs_real)(c == 2 ? width / 20 : width);
+        g.diffuse[c] = ssdgs_srgb_encode((ssdgs_real)color[c]);
+    }
+    CHECK(!ssdgs_model_set(model, index, &g));
+}
+
+/* A ball whose colours are an albedo under a sky of that irradiance: 0.5 of what comes, less what is from
+ * below. */
+static void put_ball(ssdgs_model *model, int first, double radius, const ssdgs_real ambient[9][3]) {
+    for (int i = 0; i < BALL; i++) {
+        const double z = 1 - (2 * i + 1.0) / BALL, across = sqrt(1 - z * z), turn = 2.39996323 * i;
+        const double n[3] = {across * cos(turn), across * sin(turn), z};
+        const double at[3] = {radius * n[0], radius * n[1], radius * n[2]};
+        const double term[9] = {1,
+                                n[1],
+                                n[2],
+                                n[0],
+                                n[0] * n[1],
+                                n[1] * n[2],
+                                3 * z * z - 1,
+                                n[0] * n[2],
+                                n[0] * n[0] - n[1] * n[1]};
+        double color[3];
+        for (int c = 0; c < 3; c++) {
+            double light = 0;
+            for (int j = 0; j < 9; j++) light += term[j] * (double)ambient[j][c];
+            color[c] = 0.4 * light / 3.14159265358979;
+        }
+        put(model, first + i, at, n, 2.2 * radius / sqrt((double)BALL), color);
+    }
+}
+
+static const ssdgs_real even_sky[9][3] = {{2, 2, 2}};
+static const ssdgs_real colored_sky[9][3] = {{2, 2, 2},
+                                             {0, (ssdgs_real)0.2, (ssdgs_real)0.4},
+                                             {(ssdgs_real)0.9, (ssdgs_real)0.8, (ssdgs_real)0.6},
+                                             {(ssdgs_real)0.5, 0, (ssdgs_real)-0.3}};
+
+/* The mean and the largest deviation of albedos, and how many normals are within 20 degrees of outward. */
+static int albedos(const ssdgs_model *model, int first, double mean[3], double *off) {
+    int right = 0;
+    memset(mean, 0, 3 * sizeof *mean);
+    *off = 0;
+    for (int pass = 0; pass < 2; pass++)
+        for (int i = first; i < first + BALL; i++) {
+            ssdgs_gaussian g;
+            double along = 0, length = 0;
+            CHECK(!ssdgs_model_get(model, i, &g));
+            for (int c = 0; c < 3; c++) {
+                along += (double)(g.normal[c] * g.position[c]);
+                length += (double)(g.position[c] * g.position[c]);
+                if (!pass) mean[c] += (double)g.diffuse[c] / BALL;
+                else *off = fmax(*off, fabs((double)g.diffuse[c] / mean[c] - 1));
+            }
+            right += !pass && along > 0.94 * sqrt(length);
+        }
+    return right;
+}
+
+static void test_ball(int threads, ssdgs_real *normals) {
+    ssdgs_context *context = open_context(threads);
+    ssdgs_model *model = plain_model(context, BALL);
+    unbake_options options = unbake_options_default();
+    double mean[3], off;
+    put_ball(model, 0, 0.4, even_sky);
+    const ssdgs_model_view before = ssdgs_model_peek(model);
+    ssdgs_real *planes = (ssdgs_real *)malloc(SSDGS_DIFFUSE * BALL * sizeof *planes);
+    if (!CHECK(planes != NULL)) exit(1);
+    for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
+        memcpy(planes + c * BALL, before.gaussians + c * before.stride, BALL * sizeof *planes);
+    memcpy(options.ambient, even_sky, sizeof even_sky);
+    CHECK(!unbake_model(context, &model, &options));
+    CHECK(ssdgs_model_count(model) == BALL && !ssdgs_model_settings(model)->baked);
+    CHECK(ssdgs_model_settings(model)->terms == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
+    const ssdgs_model_view after = ssdgs_model_peek(model);
+    for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
+        CHECK(!memcmp(planes + c * BALL, after.gaussians + c * after.stride, BALL * sizeof *planes));
+    CHECK(albedos(model, 0, mean, &off) == BALL);
+    printf("figure unbake_ball_albedo %.3f %.3f\n", mean[0], off);
+    for (int c = 0; c < 3; c++) CHECK(fabs(mean[c] - 0.4) < 0.08);
+    CHECK(off < 0.25);
+    for (size_t i = 0; i < BALL; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, (int)i, &g));
+        memcpy(normals + 6 * i, g.normal, sizeof g.normal);
+        memcpy(normals + 6 * i + 3, g.diffuse, sizeof g.diffuse);
+    }
+    free(planes);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+static void test_same_bits(void) {
+    static ssdgs_real one[6 * BALL], three[6 * BALL];
+    test_ball(1, one);
+    test_ball(3, three);
+    CHECK(!memcmp(one, three, sizeof one));
+}
+
+/* A sky that is told leaves no colour in the albedo; one that is not told does. */
+static void test_told(void) {
+    for (int told = 0; told < 2; told++) {
+        ssdgs_context *context = open_context(2);
+        ssdgs_model *model = plain_model(context, BALL);
+        unbake_options options = unbake_options_default();
+        double mean[3], off;
+        put_ball(model, 0, 0.4, colored_sky);
+        if (told) memcpy(options.ambient, colored_sky, sizeof colored_sky);
+        CHECK(!unbake_model(context, &model, &options));
+        CHECK(albedos(model, 0, mean, &off) == BALL);
+        printf("figure unbake_told_%d %.3f %.3f\n", told, mean[0], off);
+        if (told) CHECK(off < 0.25);
+        else CHECK(off > 0.3);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
+/* Two layers of a plate look down into the open, and up to the ball that stands on them: both are turned up.
+ */
+static void test_plate(void) {
+    static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1}, grey[3] = {0.3, 0.3, 0.3};
+    ssdgs_context *context = open_context(2);
+    ssdgs_model *model = plain_model(context, BALL + PLATE);
+    double mean[3], off;
+    int right = 0;
+    put_ball(model, 0, 0.2, even_sky);
+    for (int i = 0; i < PLATE; i++) {
+        const double at[3] = {1.0 * (i % SIDE) / SIDE - 0.5, 1.0 * (i / SIDE % SIDE) / SIDE - 0.5,
+                              i < PLATE / 2 ? -0.21 : -0.23};
+        put(model, BALL + i, at, i % 2 ? up : down, 0.6 / SIDE, grey);
+    }
+    CHECK(!unbake_model(context, &model, NULL));
+    for (int i = BALL; i < BALL + PLATE; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        right += g.normal[2] > (ssdgs_real)0.9;
+    }
+    printf("figure unbake_plate_up %.3f\n", 1.0 * right / PLATE);
+    CHECK(right > 0.95 * PLATE);
+    CHECK(albedos(model, 0, mean, &off) > 0.9 * BALL);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Wax, gloss; nothing, one Gaussian, one that is not finite; a model that is not plain. */
+static void test_edges(void) {
+    ssdgs_context *context = open_context(2);
+    unbake_options options = unbake_options_default();
+    ssdgs_gaussian g;
+    ssdgs_model *model = plain_model(context, BALL);
+    put_ball(model, 0, 0.4, even_sky);
+    for (int c = 0; c < 3; c++) options.scattering[c] = 20, options.absorption[c] = (ssdgs_real)(c + 1);
+    options.roughness = (ssdgs_real)0.3;
+    CHECK(!unbake_model(context, &model, &options));
+    const ssdgs_settings *settings = ssdgs_model_settings(model);
+    CHECK(settings->terms == SSDGS_ALL_TERMS && settings->transport && !settings->scattering.layers);
+    CHECK(settings->medium.scattering[2] > 19 && settings->medium.absorption[2] > 2);
+    CHECK(!ssdgs_model_get(model, 0, &g));
+    CHECK(g.scattering[0] > 0 && g.diffuse[0] > 0 && g.specular[0] > 0);
+    CHECK(fabs((double)g.sharpness[0] - 1 / 0.09) < 1e-3);
+    ssdgs_model *same = model;
+    CHECK(unbake_model(context, &model, NULL) == SSDGS_ERR_ARGUMENT && model == same);
+    ssdgs_model_destroy(model);
+    CHECK(unbake_model(context, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+
+    for (int count = 0; count < 2; count++) {
+        model = plain_model(context, count);
+        CHECK(!unbake_model(context, &model, NULL));
+        CHECK(ssdgs_model_count(model) == count && !ssdgs_model_settings(model)->baked);
+        ssdgs_model_destroy(model);
+    }
+    model = plain_model(context, BALL);
+    put_ball(model, 0, 0.4, even_sky);
+    ssdgs_model_view view = ssdgs_model_arrays(model);
+    view.gaussians[SSDGS_POSITION * view.stride + 7] = (ssdgs_real)NAN;
+    view.gaussians[SSDGS_DIFFUSE * view.stride + 8] = (ssdgs_real)INFINITY;
+    view.gaussians[SSDGS_ROTATION * view.stride + 9] = (ssdgs_real)NAN;
+    CHECK(!unbake_model(context, &model, NULL));
+    view = ssdgs_model_peek(model);
+    for (size_t c = SSDGS_DIFFUSE; c < SSDGS_CHANNELS; c++)
+        for (size_t i = 0; i < BALL; i++)
+            CHECK(view.gaussians[c * view.stride + i] - view.gaussians[c * view.stride + i] == 0);
+    ssdgs_model_destroy(model);
+
+    model = plain_model(context, 3);
+    same = model;
+    options.roughness = 2;
+    CHECK(unbake_model(context, &model, &options) == SSDGS_ERR_ARGUMENT && model == same);
+    CHECK(strstr(ssdgs_error_message(context), "roughness") != NULL);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+int main(void) {
+    test_same_bits();
+    test_told();
+    test_plate();
+    test_edges();
+    TEST_END();
+}
