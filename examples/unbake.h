@@ -11,10 +11,10 @@
    sees, becomes its albedo, averaged over neighbours of its hue. What things stand on was photographed from
    above: no direction from below it counts.
 
-   HOW WELL  Trained models, baked under an even sky and lit again by the lamps of their test photographs, had
-   25 dB where things are matt, 34 where they are of wax that options tell, and 22 where they are of metal,
-   which no colour tells. It takes some seconds for 150,000 Gaussians, so save the result. Its memory comes
-   from malloc(). */
+   HOW WELL  Trained models, baked under an even sky and lit again by the lamps of their test photographs
+   (tests/unbaked.c), had 25 dB where things are matt, 34 where they are of wax that options tell, and 22
+   where they are of metal, which no colour tells. It takes some seconds for 150,000 Gaussians, so save the
+   result. Its memory comes from malloc(). */
 
 #ifndef UNBAKE_H
 #define UNBAKE_H
@@ -61,11 +61,10 @@ typedef struct unbake__splat {
 typedef struct unbake__state {
     const ssdgs_model *plain;
     const unbake_options *options;
-    int count, batch, told;            /* batch: the first direction at work; told: options.ambient is */
-    ssdgs_real low[3], high[3];        /* bounds */
-    double most;                       /* sky that a Gaussian sees, but for a few */
-    double size;                       /* their longest side */
-    double sky[UNBAKE__SKY][3];        /* directions, even over the sphere */
+    int count, batch, told;     /* batch: the first direction at work; told: options.ambient is */
+    ssdgs_real low[3], high[3]; /* bounds */
+    double size, most;          /* their longest side; the sky that all but few Gaussians see less of */
+    double sky[UNBAKE__SKY][3]; /* directions, even over the sphere */
     unsigned char counts[UNBAKE__SKY]; /* 0: nothing was photographed from there */
     unsigned char *seen;               /* (UNBAKE__SKY, count) how well, 255: fully */
     unbake__splat *splat;              /* (count) */
@@ -92,9 +91,17 @@ static inline ssdgs_result unbake__walk(void *user, ssdgs_frame *frame) {
     return result;
 }
 
+/* The Gaussians' places, shapes and opacities, bit for bit. */
+static inline void unbake__copy(const unbake__state *u, ssdgs_model *model) {
+    const ssdgs_model_view from = ssdgs_model_peek(u->plain), to = ssdgs_model_arrays(model);
+    for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
+        memcpy(to.gaussians + c * to.stride, from.gaussians + c * from.stride,
+               (size_t)u->count * sizeof *to.gaussians);
+}
+
+/* Who sees the sky: lights from all around shine on the Gaussians. */
 static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context) {
     ssdgs_settings settings = ssdgs_settings_default();
-    const ssdgs_model_view from = ssdgs_model_peek(u->plain);
     const ssdgs_render_options coarse = ssdgs_render_options_preview();
     ssdgs_gpu_hook hook;
     ssdgs_context_desc desc;
@@ -115,12 +122,7 @@ static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context
     settings.length_unit = u->size > 0 ? (ssdgs_real)(u->size / 2) : 1;
     if (!result) result = ssdgs_model_create(own, &settings, u->count, &model);
     if (!result) result = ssdgs_scene_create(own, &scene);
-    if (!result) {
-        const ssdgs_model_view to = ssdgs_model_arrays(model);
-        for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
-            memcpy(to.gaussians + c * to.stride, from.gaussians + c * from.stride,
-                   (size_t)u->count * sizeof *to.gaussians);
-    }
+    if (!result) unbake__copy(u, model);
     const ssdgs_object object = ssdgs_object_default(model);
     for (u->batch = 0; u->batch < UNBAKE__SKY && !result; u->batch += UNBAKE__AT_ONCE) {
         ssdgs_light lights[UNBAKE__AT_ONCE];
@@ -386,14 +388,23 @@ static inline int unbake__compare(const void *a, const void *b) {
     return x < y ? -1 : x > y;
 }
 
-/* Of pairs (count) of a value and its weight, which it sorts: the value that all but few are below. */
-static inline double unbake__most(float *pairs, int count) {
+/* What all but few Gaussians are below, by surface: their share of the sky, or their albedo's brightest
+   channel. Writes over `averaged`. */
+static inline double unbake__most(const unbake__state *u, int of_albedo) {
+    float *pairs = u->averaged;
     double all = 0, sum = 0;
     int at = 0;
-    for (int i = 0; i < count; i++) all += (double)pairs[2 * (size_t)i + 1];
-    qsort(pairs, (size_t)count, 2 * sizeof *pairs, unbake__compare);
-    while (at < count - 1 && sum < UNBAKE__MOST * all) sum += (double)pairs[2 * (size_t)at++ + 1];
-    return count ? (double)pairs[2 * (size_t)at] : 0;
+    for (int i = 0; i < u->count; i++) { /* a value and how much surface has it */
+        const unbake__splat *s = u->splat + i;
+        const float *a = u->albedo + 3 * (size_t)i, *pair = pairs + 2 * (size_t)i;
+        const float most = a[0] > a[1] ? a[0] > a[2] ? a[0] : a[2] : a[1] > a[2] ? a[1] : a[2];
+        pairs[2 * (size_t)i] = of_albedo ? most : s->share;
+        pairs[2 * (size_t)i + 1] = s->share > 0 ? s->weight * s->share : 0;
+        all += (double)pair[1];
+    }
+    qsort(pairs, (size_t)u->count, 2 * sizeof *pairs, unbake__compare);
+    while (at < u->count - 1 && sum < UNBAKE__MOST * all) sum += (double)pairs[2 * (size_t)at++ + 1];
+    return u->count ? (double)pairs[2 * (size_t)at] : 0;
 }
 
 static inline ssdgs_result unbake__find(unbake__state *u, ssdgs_context *context) {
@@ -409,11 +420,7 @@ static inline ssdgs_result unbake__find(unbake__state *u, ssdgs_context *context
     if (result) return result;
     unbake__stand(u);
     result = ssdgs_context_run(context, chunks, unbake__side_task, u);
-    for (int i = 0; i < u->count; i++) {
-        u->averaged[2 * (size_t)i] = u->splat[i].share;
-        u->averaged[2 * (size_t)i + 1] = u->splat[i].weight * u->splat[i].share;
-    }
-    u->most = unbake__most(u->averaged, u->count);
+    u->most = unbake__most(u, 0);
     if (!(u->most > 0)) u->most = 1;
     if (!result) result = ssdgs_context_run(context, chunks, unbake__albedo_task, u);
     for (int i = 0; i < u->count; i++) u->tree[i] = (uint32_t)i;
@@ -432,8 +439,7 @@ static inline ssdgs_result unbake__find(unbake__state *u, ssdgs_context *context
 static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context, ssdgs_model **out) {
     const unbake_options *o = u->options;
     const ssdgs_settings *plain = ssdgs_model_settings(u->plain);
-    const ssdgs_model_view from = ssdgs_model_peek(u->plain);
-    double white;
+    const double white = unbake__most(u, 1);
     ssdgs_settings settings = ssdgs_settings_default();
     int translucent = 0;
     for (int c = 0; c < 3; c++) translucent |= o->scattering[c] > 0;
@@ -449,19 +455,14 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
     for (int c = 0; c < 3; c++) settings.centre[c] = (u->low[c] + u->high[c]) / 2;
     settings.length_unit = u->size > 0 ? (ssdgs_real)(u->size / 2) : 1;
     ssdgs_result result = ssdgs_model_create(context, &settings, u->count, out);
-    for (int i = 0; i < u->count; i++) { /* by the brightest channel */
-        const float *a = u->albedo + 3 * (size_t)i;
-        u->averaged[2 * (size_t)i] = a[0] > a[1] ? a[0] > a[2] ? a[0] : a[2] : a[1] > a[2] ? a[1] : a[2];
-        u->averaged[2 * (size_t)i + 1] = u->splat[i].weight * u->splat[i].share;
+    ssdgs_gaussian g = ssdgs_gaussian_default();
+    g.softness = (ssdgs_real)0.2;
+    if (o->roughness > 0 && !result) {
+        const ssdgs_real both[2] = {o->roughness, o->roughness};
+        result = ssdgs_gaussian_mirror(*out, both, &g);
+        g.f0 = o->f0;
     }
-    white = unbake__most(u->averaged, u->count);
     for (int i = 0; i < u->count && !result; i++) {
-        ssdgs_gaussian g = ssdgs_gaussian_default();
-        if (o->roughness > 0) {
-            const ssdgs_real both[2] = {o->roughness, o->roughness};
-            result = ssdgs_gaussian_mirror(*out, both, &g);
-            g.f0 = o->f0;
-        }
         for (int c = 0; c < 3; c++) {
             double albedo = (double)u->albedo[3 * (size_t)i + (size_t)c];
             albedo = albedo < white ? albedo : white;
@@ -470,15 +471,10 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
             g.diffuse[c] = (ssdgs_real)(translucent ? albedo / 2 : albedo);
             g.scattering[c] = translucent ? g.diffuse[c] : 0;
         }
-        g.softness = (ssdgs_real)0.2;
-        if (!result) result = ssdgs_model_set(*out, i, &g);
+        result = ssdgs_model_set(*out, i, &g);
     }
-    if (result) return result;
-    const ssdgs_model_view to = ssdgs_model_arrays(*out);
-    for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
-        memcpy(to.gaussians + c * to.stride, from.gaussians + c * from.stride,
-               (size_t)u->count * sizeof *to.gaussians);
-    return SSDGS_OK;
+    if (!result) unbake__copy(u, *out);
+    return result;
 }
 
 /* Makes of *model, a plain splat (settings.baked), one that takes light, on the same context, destroys it and
