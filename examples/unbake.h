@@ -253,7 +253,7 @@ static inline void unbake__side_task(void *data, int chunk) {
         }
         for (int c = 0; c < 3; c++) {
             s->normal[c] = (float)(n[c] / sqrt(length));
-            share += 4 * sky[c] * (double)s->normal[c]; /* 1 on an open plane */
+            share += sky[c] * (double)s->normal[c];
         }
         s->share = (float)share;
     }

@@ -72,8 +72,13 @@ static void put_ball(ssdgs_model *model, int first, double radius, const ssdgs_r
 static const ssdgs_real even_sky[9][3] = {{2, 2, 2}};
 static const ssdgs_real colored_sky[9][3] = {{2, 2, 2},
                                              {0, (ssdgs_real)0.2, (ssdgs_real)0.4},
-                                             {(ssdgs_real)0.9, (ssdgs_real)0.8, (ssdgs_real)0.6},
-                                             {(ssdgs_real)0.5, 0, (ssdgs_real)-0.3}};
+                                             {(ssdgs_real)0.6, (ssdgs_real)0.5, (ssdgs_real)0.4},
+                                             {(ssdgs_real)0.4, 0, (ssdgs_real)-0.3},
+                                             {(ssdgs_real)0.3, (ssdgs_real)-0.3, 0},
+                                             {0, (ssdgs_real)0.3, (ssdgs_real)-0.3},
+                                             {(ssdgs_real)-0.1, 0, (ssdgs_real)0.1},
+                                             {0, (ssdgs_real)-0.3, (ssdgs_real)0.3},
+                                             {(ssdgs_real)0.2, (ssdgs_real)-0.2, (ssdgs_real)0.2}};
 
 /* The mean and the largest deviation of albedos, and how many normals are within 20 degrees of outward. */
 static int albedos(const ssdgs_model *model, int first, double mean[3], double *off) {
@@ -116,8 +121,8 @@ static void test_ball(int threads, ssdgs_real *normals) {
         CHECK(!memcmp(planes + c * BALL, after.gaussians + c * after.stride, BALL * sizeof *planes));
     CHECK(albedos(model, 0, mean, &off) == BALL);
     printf("figure unbake_ball_albedo %.3f %.3f\n", mean[0], off);
-    for (int c = 0; c < 3; c++) CHECK(fabs(mean[c] - 0.4) < 0.08);
-    CHECK(off < 0.25);
+    for (int c = 0; c < 3; c++) CHECK(fabs(mean[c] - 0.4) < 0.03);
+    CHECK(off < 0.05);
     for (size_t i = 0; i < BALL; i++) {
         ssdgs_gaussian g;
         CHECK(!ssdgs_model_get(model, (int)i, &g));
@@ -148,8 +153,9 @@ static void test_told(void) {
         CHECK(!unbake_model(context, &model, &options));
         CHECK(albedos(model, 0, mean, &off) == BALL);
         printf("figure unbake_told_%d %.3f %.3f\n", told, mean[0], off);
-        if (told) CHECK(off < 0.25);
+        if (told) CHECK(off < 0.05);
         else CHECK(off > 0.3);
+        CHECK(told || fmax(mean[0], fmax(mean[1], mean[2])) < 0.9);
         ssdgs_model_destroy(model);
         ssdgs_context_destroy(context);
     }
@@ -158,7 +164,7 @@ static void test_told(void) {
 /* Two layers of a plate look down into the open, and up to the ball that stands on them: both are turned up.
  */
 static void test_plate(void) {
-    static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1}, grey[3] = {0.3, 0.3, 0.3};
+    static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1}, grey[3] = {0.1, 0.1, 0.1};
     ssdgs_context *context = open_context(2);
     ssdgs_model *model = plain_model(context, BALL + PLATE);
     double mean[3], off;
@@ -182,6 +188,119 @@ static void test_plate(void) {
     ssdgs_context_destroy(context);
 }
 
+/* A ball of two colours: they do not run into each other. The white of what is not told is 0.9. */
+static void test_hues(void) {
+    static const double hue[2][3] = {{0.3, 0.02, 0.02}, {0.02, 0.02, 0.3}};
+    ssdgs_context *context = open_context(2);
+    ssdgs_model *model = plain_model(context, BALL);
+    double least = 1;
+    put_ball(model, 0, 0.4, even_sky);
+    for (int i = 0; i < BALL; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        for (int c = 0; c < 3; c++) g.diffuse[c] = ssdgs_srgb_encode((ssdgs_real)hue[i < BALL / 2][c]);
+        CHECK(!ssdgs_model_set(model, i, &g));
+    }
+    CHECK(!unbake_model(context, &model, NULL));
+    for (int i = 0; i < BALL; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        const int blue = i < BALL / 2 ? 0 : 2;
+        least = fmin(least, (double)g.diffuse[2 - blue]);
+        CHECK((double)g.diffuse[blue] < 0.12);
+    }
+    printf("figure unbake_hues_least %.3f\n", least);
+    CHECK(least > 0.8);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
+/* Half of the sky that the open sees gives half of the light, and a twentieth at least. */
+static void test_share(void) {
+    const unbake_options options = unbake_options_default();
+    unbake__splat splat[3];
+    float albedo[9];
+    unbake__state u;
+    memset(&u, 0, sizeof u);
+    memset(splat, 0, sizeof splat);
+    u.options = &options;
+    u.count = 3;
+    u.most = 0.4;
+    u.splat = splat;
+    u.albedo = albedo;
+    for (int i = 0; i < 3; i++) {
+        splat[i].normal[2] = 1;
+        splat[i].share = i ? i == 1 ? 0.2f : 0.001f : 0.5f;
+        splat[i].color[1] = 0.1f;
+    }
+    unbake__albedo_task(&u, 0);
+    for (int i = 0; i < 3; i++) {
+        const double light = i ? i == 1 ? 0.5 : 0.05 : 1;
+        CHECK(fabs((double)albedo[3 * i + 1] * light - 0.1 * 3.14159265) < 1e-5 && albedo[3 * i] == 0);
+    }
+}
+
+/* The tree finds the nearest, also where many lie in one place. */
+static void test_nearest(void) {
+    static unbake__splat splat[BALL];
+    static uint32_t tree[BALL], who[UNBAKE__NEAR];
+    static unsigned char across[BALL];
+    unbake__state u;
+    memset(&u, 0, sizeof u);
+    u.count = BALL;
+    u.splat = splat;
+    u.tree = tree;
+    u.across = across;
+    for (int i = 0; i < BALL; i++) {
+        tree[i] = (uint32_t)i;
+        for (int c = 0; c < 3; c++)
+            splat[i].position[c] = i % 5 ? (float)test_uniform(7, (uint64_t)(3 * i + c)) : 0.5f;
+    }
+    unbake__cut(&u, 0, BALL);
+    for (int i = 0; i < BALL; i++) {
+        unbake__near near_by;
+        int closer = 0;
+        near_by.at = splat[i].position;
+        near_by.who = who;
+        near_by.count = 0;
+        unbake__search(&u, 0, BALL, &near_by);
+        if (!CHECK(near_by.count == UNBAKE__NEAR)) continue;
+        for (int j = 0; j < BALL; j++) {
+            float d2 = 0;
+            for (int c = 0; c < 3; c++) {
+                const float d = splat[j].position[c] - splat[i].position[c];
+                d2 += d * d;
+            }
+            closer += d2 < near_by.distance2[UNBAKE__NEAR - 1];
+        }
+        CHECK(closer < UNBAKE__NEAR);
+    }
+}
+
+/* Half a ball that is closed below stands on nothing: its bottom looks down. */
+static void test_bottom(void) {
+    static const double down[3] = {0, 0, -1}, grey[3] = {0.2, 0.2, 0.2};
+    ssdgs_context *context = open_context(2);
+    ssdgs_model *model = plain_model(context, BALL);
+    int right = 0;
+    put_ball(model, 0, 0.4, even_sky);
+    for (int i = BALL / 2; i < BALL; i++) { /* the lower half becomes a disk */
+        const double from = 0.4 * sqrt((i - BALL / 2 + 0.5) / (BALL / 2)), turn = 2.39996323 * i;
+        const double at[3] = {from * cos(turn), from * sin(turn), 0};
+        put(model, i, at, down, 0.022, grey);
+    }
+    CHECK(!unbake_model(context, &model, NULL));
+    for (int i = BALL / 2; i < BALL; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        right += g.normal[2] < (ssdgs_real)-0.9;
+    }
+    printf("figure unbake_bottom_down %.3f\n", 2.0 * right / BALL);
+    CHECK(right > 0.98 * (BALL / 2));
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 /* Wax, gloss; nothing, one Gaussian, one that is not finite; a model that is not plain. */
 static void test_edges(void) {
     ssdgs_context *context = open_context(2);
@@ -196,7 +315,8 @@ static void test_edges(void) {
     CHECK(settings->terms == SSDGS_ALL_TERMS && settings->transport && !settings->scattering.layers);
     CHECK(settings->medium.scattering[2] > 19 && settings->medium.absorption[2] > 2);
     CHECK(!ssdgs_model_get(model, 0, &g));
-    CHECK(g.scattering[0] > 0 && g.diffuse[0] > 0 && g.specular[0] > 0);
+    CHECK(fabs((double)g.diffuse[0] - 0.45) < 0.02 && fabs((double)g.scattering[0] - 0.45) < 0.02);
+    CHECK(g.specular[0] > 0 && fabs((double)g.f0 - 0.04) < 1e-4);
     CHECK(fabs((double)g.sharpness[0] - 1 / 0.09) < 1e-3);
     ssdgs_model *same = model;
     CHECK(unbake_model(context, &model, NULL) == SSDGS_ERR_ARGUMENT && model == same);
@@ -235,6 +355,10 @@ int main(void) {
     test_same_bits();
     test_told();
     test_plate();
+    test_hues();
+    test_bottom();
+    test_share();
+    test_nearest();
     test_edges();
     TEST_END();
 }
