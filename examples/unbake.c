@@ -15,7 +15,7 @@ static int usage(void) {
         "                   taken for 0.9\n"
         "  --medium S,A     it is of wax or skin: reduced scattering and absorption of one world unit\n"
         "  --roughness R    it has highlights, of Beckmann's roughness 0.01 .. 1\n"
-        "  --f0 F           what they reflect from the front, above 0, up to 1; 0.04\n");
+        "  --f0 F           with --roughness: what they reflect from the front, above 0, up to 1; 0.04\n");
     return 2;
 }
 
@@ -40,7 +40,6 @@ int main(int argc, char **argv) {
     unbake_options options = unbake_options_default();
     const char *from = NULL, *to = NULL;
     char error[512] = "";
-    ssdgs_context_desc desc;
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
     olat_guard guard;
@@ -67,18 +66,13 @@ int main(int argc, char **argv) {
     memset(&guard, 0, sizeof guard);
     int failed = olat_guard_input(&guard, from, error) || olat_guard_output(&guard, to, error);
     olat_guard_free(&guard);
-    memset(&desc, 0, sizeof desc);
-    ssdgs_result result = failed ? SSDGS_OK : ssdgs_context_create(&desc, &context);
+    ssdgs_result result = failed ? SSDGS_OK : ssdgs_context_create(NULL, &context);
     if (!failed && !result) result = ssdgs_model_load(context, from, &model, NULL);
     if (!failed && !result && !ssdgs_model_settings(model)->baked)
         failed = olat__fail(error, "%s: is no plain splat, it takes light as it is", from);
     if (!failed && !result && ssdgs_model_settings(model)->harmonics)
         fprintf(stderr, "%s: %s: how its colours change with the view is left out\n", program, from);
-    if (!failed && !result) {
-        result = unbake_model(context, &model, &options);
-        if (result == SSDGS_ERR_ARGUMENT && !*ssdgs_error_message(context))
-            failed = olat__fail(error, "an option is out of range");
-    }
+    if (!failed && !result) result = unbake_model(context, &model, &options);
     if (!failed && !result) result = ssdgs_model_save(model, to);
     if (!failed && !result) printf("%s: %d Gaussians that take light\n", to, ssdgs_model_count(model));
     if (failed) fprintf(stderr, "%s: %s\n", program, error);

@@ -24,13 +24,13 @@
 #include <string.h>
 
 #define UNBAKE__SKY 32     /* directions from which it is seen */
-#define UNBAKE__AT_ONCE 4  /* of them, in one frame */
+#define UNBAKE__AT_ONCE 8  /* of them, in one frame */
 #define UNBAKE__NEAR 24    /* neighbours */
 #define UNBAKE__ROUNDS 10  /* of averaging albedos over them */
 #define UNBAKE__CHUNK 256  /* Gaussians of a task */
 #define UNBAKE__FLAT 0.85  /* cosine of the angle to a plane's normal within which a Gaussian lies in it */
 #define UNBAKE__THICK 0.06 /* of the model's size: half a plane's thickness */
-#define UNBAKE__BELOW 0.3  /* sine of the angle below the horizon from where what things stand on is seen */
+#define UNBAKE__BELOW 0.3  /* sine: directions count down to this angle below what things stand on */
 #define UNBAKE__LEAST 0.05 /* share of the sky that a Gaussian sees, at least */
 #define UNBAKE__MOST 0.95  /* of the surface: what sees or reflects more counts as what is at this share */
 
@@ -61,17 +61,17 @@ typedef struct unbake__splat {
 typedef struct unbake__state {
     const ssdgs_model *plain;
     const unbake_options *options;
-    int count, batch, told;     /* batch: the first direction at work; told: options.ambient is */
-    ssdgs_real low[3], high[3]; /* bounds */
-    double size, most;          /* their longest side; the sky that all but few Gaussians see less of */
-    double sky[UNBAKE__SKY][3]; /* directions, even over the sphere */
-    unsigned char counts[UNBAKE__SKY]; /* 0: nothing was photographed from there */
-    unsigned char *seen;               /* (UNBAKE__SKY, count) how well, 255: fully */
-    unbake__splat *splat;              /* (count) */
-    uint32_t *tree, *near_by;          /* (count) a k-d tree; (count, UNBAKE__NEAR) */
-    unsigned char *across;             /* (count) the axis along which the tree is cut */
-    float *tells;                      /* (count, UNBAKE__NEAR) shares of the neighbours, itself one */
-    float *albedo, *averaged;          /* (count, 3) */
+    int count, batch, told;          /* batch: the first direction at work; told: options.ambient is */
+    ssdgs_real low[3], high[3];      /* bounds */
+    double size, most;               /* their longest side; the sky that all but few Gaussians see less of */
+    double sky[UNBAKE__SKY][3];      /* directions, even over the sphere */
+    unsigned char used[UNBAKE__SKY]; /* 0: nothing was photographed from there */
+    unsigned char *seen;             /* (UNBAKE__SKY, count) how well, 255: fully */
+    unbake__splat *splat;            /* (count) */
+    uint32_t *tree, *neighbours;     /* (count) a k-d tree; (count, UNBAKE__NEAR) */
+    unsigned char *across;           /* (count) the axis along which the tree is cut */
+    float *tells;                    /* (count, UNBAKE__NEAR) shares of the neighbours, itself one */
+    float *albedo, *averaged;        /* (count, 3) */
 } unbake__state;
 
 static inline double unbake__dot(const double a[3], const float b[3]) {
@@ -202,8 +202,8 @@ static inline double unbake__plane(const unbake__state *u, int k, double plane[3
     return within / all;
 }
 
-/* Things that stand on something were photographed from above, so directions from below do not count. It is
-   what looks flattest from outside, where there is air on its other side, too. */
+/* A plane that looks flat from some direction and has air on both sides is taken for what things stand on.
+   Photographs show it from above, so directions from below it do not count. */
 static inline void unbake__stand(unbake__state *u) {
     double best = 0, down[3] = {0, 0, 0}, middle = 0, sides[2] = {0, 0};
     int from = 0;
@@ -228,7 +228,7 @@ static inline void unbake__stand(unbake__state *u) {
     const int stands = best > 0.4 && sides[1] > 0.25 * sides[0];
     for (int k = 0; k < UNBAKE__SKY; k++) {
         const double *d = u->sky[k];
-        u->counts[k] = !stands || down[0] * d[0] + down[1] * d[1] + down[2] * d[2] < UNBAKE__BELOW;
+        u->used[k] = !stands || down[0] * d[0] + down[1] * d[1] + down[2] * d[2] < UNBAKE__BELOW;
     }
 }
 
@@ -241,7 +241,7 @@ static inline void unbake__side_task(void *data, int chunk) {
         for (int k = 0; k < UNBAKE__SKY; k++) {
             const double seen = u->seen[(size_t)k * (size_t)u->count + (size_t)i] / (255.0 * UNBAKE__SKY);
             for (int c = 0; c < 3; c++) sky[c] += seen * u->sky[k][c];
-            if (!u->counts[k]) continue;
+            if (!u->used[k]) continue;
             side += seen * unbake__dot(u->sky[k], s->axis);
             for (int c = 0; c < 3; c++) open[c] += seen * u->sky[k][c];
         }
@@ -324,24 +324,24 @@ typedef struct unbake__near {
     float distance2[UNBAKE__NEAR];
     int count;
 } unbake__near;
-static inline void unbake__search(const unbake__state *u, int from, int to, unbake__near *near_by) {
+static inline void unbake__search(const unbake__state *u, int from, int to, unbake__near *found) {
     while (from < to) {
         const int middle = (from + to) / 2, axis = u->across[middle];
         const float *p = u->splat[u->tree[middle]].position;
         float d2 = 0;
-        for (int c = 0; c < 3; c++) d2 += (p[c] - near_by->at[c]) * (p[c] - near_by->at[c]);
-        if (near_by->count < UNBAKE__NEAR || d2 < near_by->distance2[UNBAKE__NEAR - 1]) {
-            int j = near_by->count < UNBAKE__NEAR ? near_by->count++ : UNBAKE__NEAR - 1;
-            for (; j && d2 < near_by->distance2[j - 1]; j--) {
-                near_by->distance2[j] = near_by->distance2[j - 1];
-                near_by->who[j] = near_by->who[j - 1];
+        for (int c = 0; c < 3; c++) d2 += (p[c] - found->at[c]) * (p[c] - found->at[c]);
+        if (found->count < UNBAKE__NEAR || d2 < found->distance2[UNBAKE__NEAR - 1]) {
+            int j = found->count < UNBAKE__NEAR ? found->count++ : UNBAKE__NEAR - 1;
+            for (; j && d2 < found->distance2[j - 1]; j--) {
+                found->distance2[j] = found->distance2[j - 1];
+                found->who[j] = found->who[j - 1];
             }
-            near_by->distance2[j] = d2;
-            near_by->who[j] = u->tree[middle];
+            found->distance2[j] = d2;
+            found->who[j] = u->tree[middle];
         }
-        const float beyond = near_by->at[axis] - p[axis];
-        unbake__search(u, beyond < 0 ? from : middle + 1, beyond < 0 ? middle : to, near_by);
-        if (near_by->count == UNBAKE__NEAR && beyond * beyond > near_by->distance2[UNBAKE__NEAR - 1]) return;
+        const float beyond = found->at[axis] - p[axis];
+        unbake__search(u, beyond < 0 ? from : middle + 1, beyond < 0 ? middle : to, found);
+        if (found->count == UNBAKE__NEAR && beyond * beyond >= found->distance2[UNBAKE__NEAR - 1]) return;
         if (beyond < 0) from = middle + 1;
         else to = middle;
     }
@@ -354,14 +354,14 @@ static inline void unbake__near_task(void *data, int chunk) {
         const size_t first = (size_t)i * UNBAKE__NEAR;
         const unbake__splat *s = u->splat + i;
         double sum = 0;
-        unbake__near near_by;
-        near_by.at = s->position;
-        near_by.who = u->near_by + first;
-        near_by.count = 0;
-        unbake__search(u, 0, u->count, &near_by);
-        for (; near_by.count < UNBAKE__NEAR; near_by.count++) near_by.who[near_by.count] = (uint32_t)i;
+        unbake__near found;
+        found.at = s->position;
+        found.who = u->neighbours + first;
+        found.count = 0;
+        unbake__search(u, 0, u->count, &found);
+        for (; found.count < UNBAKE__NEAR; found.count++) found.who[found.count] = (uint32_t)i;
         for (size_t j = first; j < first + UNBAKE__NEAR; j++) {
-            const unbake__splat *o = u->splat + u->near_by[j];
+            const unbake__splat *o = u->splat + u->neighbours[j];
             const double red = (double)(s->hue[0] - o->hue[0]), green = (double)(s->hue[1] - o->hue[1]);
             u->tells[j] = (float)(((double)o->weight + 1e-12) * (double)(o->share * o->share) *
                                   exp(-450 * (red * red + green * green + red * green)));
@@ -378,7 +378,8 @@ static inline void unbake__average_task(void *data, int chunk) {
     for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
         float sum[3] = {0, 0, 0};
         for (size_t j = (size_t)i * UNBAKE__NEAR; j < ((size_t)i + 1) * UNBAKE__NEAR; j++)
-            for (size_t c = 0; c < 3; c++) sum[c] += u->tells[j] * u->albedo[3 * (size_t)u->near_by[j] + c];
+            for (size_t c = 0; c < 3; c++)
+                sum[c] += u->tells[j] * u->albedo[3 * (size_t)u->neighbours[j] + c];
         memcpy(u->averaged + 3 * (size_t)i, sum, sizeof sum);
     }
 }
@@ -456,7 +457,7 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
     settings.length_unit = u->size > 0 ? (ssdgs_real)(u->size / 2) : 1;
     ssdgs_result result = ssdgs_model_create(context, &settings, u->count, out);
     ssdgs_gaussian g = ssdgs_gaussian_default();
-    g.softness = (ssdgs_real)0.2;
+    g.softness = (ssdgs_real)0.2; /* sharp shadows, smoothed a little where depths are not sure */
     if (o->roughness > 0 && !result) {
         const ssdgs_real both[2] = {o->roughness, o->roughness};
         result = ssdgs_gaussian_mirror(*out, both, &g);
@@ -478,9 +479,10 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
 }
 
 /* Makes of *model, a plain splat (settings.baked), one that takes light, on the same context, destroys it and
-   puts the new one in its place. Its own light is gone. options NULL = default. The same bits on any number
-   of threads. A model that an object uses must not be given. ERR_ARGUMENT: it is not baked, or an option is
-   out of range. ERR_MEMORY. Where it fails, *model is as it was. */
+   puts the new one in its place. Its own light and how that changes with the view are gone. options NULL =
+   default. The same bits on any number of threads. A model that an object uses must not be given.
+   ERR_ARGUMENT: it is not baked, or an option is out of range. ERR_MEMORY. Where it fails, *model is as it
+   was. */
 static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model **model,
                                         const unbake_options *options) {
     const unbake_options none = unbake_options_default();
@@ -496,19 +498,19 @@ static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model **mo
     u.seen = (unsigned char *)calloc(n, UNBAKE__SKY);
     u.splat = (unbake__splat *)calloc(n, sizeof *u.splat);
     u.tree = (uint32_t *)calloc(n, sizeof *u.tree);
-    u.near_by = (uint32_t *)calloc(n, UNBAKE__NEAR * sizeof *u.near_by);
+    u.neighbours = (uint32_t *)calloc(n, UNBAKE__NEAR * sizeof *u.neighbours);
     u.tells = (float *)calloc(n, UNBAKE__NEAR * sizeof *u.tells);
     u.across = (unsigned char *)calloc(n, 1);
     u.albedo = (float *)calloc(n, 3 * sizeof *u.albedo);
     u.averaged = (float *)calloc(n, 3 * sizeof *u.averaged);
     ssdgs_result result =
-        u.seen && u.splat && u.tree && u.near_by && u.tells && u.across && u.albedo && u.averaged
+        u.seen && u.splat && u.tree && u.neighbours && u.tells && u.across && u.albedo && u.averaged
             ? ssdgs_model_bounds(*model, u.low, u.high)
             : SSDGS_ERR_MEMORY;
     for (int c = 0; c < 3 && !result; c++) u.size = fmax(u.size, (double)(u.high[c] - u.low[c]));
     if (!result) result = unbake__find(&u, context);
     if (!result) result = unbake__make(&u, context, &lit);
-    free(u.seen), free(u.splat), free(u.tree), free(u.near_by), free(u.tells), free(u.across);
+    free(u.seen), free(u.splat), free(u.tree), free(u.neighbours), free(u.tells), free(u.across);
     free(u.albedo), free(u.averaged);
     ssdgs_model_destroy(result ? lit : *model);
     if (!result) *model = lit;

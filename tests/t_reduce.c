@@ -9,15 +9,6 @@ enum { SIDE = 96, PIXELS = SIDE * SIDE };
 
 static double draw(uint64_t counter) { return test_uniform(91, counter); }
 
-static ssdgs_context *open_context(int threads) {
-    ssdgs_context_desc desc;
-    ssdgs_context *context = NULL;
-    memset(&desc, 0, sizeof desc);
-    desc.threads = threads;
-    if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-    return context;
-}
-
 static ssdgs_model *new_model(ssdgs_context *context, const ssdgs_settings *settings, int count) {
     ssdgs_model *model = NULL;
     if (!CHECK(!ssdgs_model_create(context, settings, count, &model))) exit(1);
@@ -75,7 +66,7 @@ static void moments(const ssdgs_model *model, int count, double sum[10]) {
 }
 
 static void test_moments(void) {
-    ssdgs_context *context = open_context(1);
+    ssdgs_context *context = test_context(1);
     ssdgs_model *model = new_model(context, NULL, 600);
     double before[10], after[10];
     for (int i = 0; i < 600; i++) {
@@ -97,7 +88,7 @@ static void test_moments(void) {
  */
 static void test_twins(void) {
     enum { N = 200 };
-    ssdgs_context *context = open_context(1);
+    ssdgs_context *context = test_context(1);
     ssdgs_model *model = new_model(context, NULL, 2 * N);
     const ssdgs_model_view v = ssdgs_model_arrays(model);
     int whole = 0, turned = 0;
@@ -154,7 +145,7 @@ static void test_twins(void) {
 /* Inside of a closed shell is nothing that one would miss. */
 static void test_hidden(int baked) {
     enum { SHELL = 400, INSIDE = 200 };
-    ssdgs_context *context = open_context(1);
+    ssdgs_context *context = test_context(1);
     ssdgs_settings settings = ssdgs_settings_default();
     settings.baked = baked;
     ssdgs_model *model = new_model(context, &settings, SHELL + INSIDE);
@@ -237,7 +228,7 @@ static double error_of(const ssdgs_real *a, const ssdgs_real *b) {
 static void test_looks(void) {
     static ssdgs_real whole[3 * PIXELS], reduced[3 * PIXELS], fewer[3 * PIXELS];
     static const int terms[6] = {SSDGS_DIFFUSE_TERM, 3, 5, 9, 15, 0};
-    ssdgs_context *context = open_context(2);
+    ssdgs_context *context = test_context(2);
     for (size_t i = 0; i < sizeof terms / sizeof *terms; i++) {
         ssdgs_model *model = striped(context, 4000, 1, terms[i]), *half = striped(context, 4000, 2, terms[i]);
         double power = 0;
@@ -260,7 +251,7 @@ static void test_edges(void) {
     ssdgs_context *contexts[2];
     ssdgs_model *models[2];
     for (int i = 0; i < 2; i++) {
-        contexts[i] = open_context(1 + 2 * i);
+        contexts[i] = test_context(1 + 2 * i);
         models[i] = striped(contexts[i], 1500, 1, SSDGS_ALL_TERMS);
         const ssdgs_model_view v = ssdgs_model_arrays(models[i]);
         const ssdgs_settings before = *ssdgs_model_settings(models[i]);
@@ -297,7 +288,7 @@ static void test_edges(void) {
 static void test_after_frame(void) {
     static ssdgs_real color[PIXELS * 3];
     const ssdgs_render_options options = ssdgs_render_options_exact();
-    ssdgs_context *context = open_context(1);
+    ssdgs_context *context = test_context(1);
     ssdgs_model *models[2];
     for (int i = 0; i < 2; i++) {
         ssdgs_settings settings = ssdgs_settings_default();
@@ -335,7 +326,7 @@ static void test_after_frame(void) {
 static void test_rest(void) {
     enum { N = 5000 };
     static unsigned char met[N];
-    ssdgs_context *context = open_context(2);
+    ssdgs_context *context = test_context(2);
     ssdgs_model *model = new_model(context, NULL, N);
     for (int i = 0; i < N; i++) {
         ssdgs_gaussian g = any(i);

@@ -7,15 +7,6 @@
 
 enum { BALL = 1500, SIDE = 30, PLATE = 2 * SIDE * SIDE };
 
-static ssdgs_context *open_context(int threads) {
-    ssdgs_context_desc desc;
-    ssdgs_context *context = NULL;
-    memset(&desc, 0, sizeof desc);
-    desc.threads = threads;
-    if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
-    return context;
-}
-
 static ssdgs_model *plain_model(ssdgs_context *context, int count) {
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_model *model = NULL;
@@ -102,7 +93,7 @@ static int albedos(const ssdgs_model *model, int first, double mean[3], double *
 }
 
 static void test_ball(int threads, ssdgs_real *normals) {
-    ssdgs_context *context = open_context(threads);
+    ssdgs_context *context = test_context(threads);
     ssdgs_model *model = plain_model(context, BALL);
     unbake_options options = unbake_options_default();
     double mean[3], off;
@@ -144,7 +135,7 @@ static void test_same_bits(void) {
 /* A sky that is told leaves no colour in the albedo; one that is not told does. */
 static void test_told(void) {
     for (int told = 0; told < 2; told++) {
-        ssdgs_context *context = open_context(2);
+        ssdgs_context *context = test_context(2);
         ssdgs_model *model = plain_model(context, BALL);
         unbake_options options = unbake_options_default();
         double mean[3], off;
@@ -165,7 +156,7 @@ static void test_told(void) {
  */
 static void test_plate(void) {
     static const double up[3] = {0, 0, 1}, down[3] = {0, 0, -1}, grey[3] = {0.1, 0.1, 0.1};
-    ssdgs_context *context = open_context(2);
+    ssdgs_context *context = test_context(2);
     ssdgs_model *model = plain_model(context, BALL + PLATE);
     double mean[3], off;
     int right = 0;
@@ -191,7 +182,7 @@ static void test_plate(void) {
 /* A ball of two colours: they do not run into each other. The white of what is not told is 0.9. */
 static void test_hues(void) {
     static const double hue[2][3] = {{0.3, 0.02, 0.02}, {0.02, 0.02, 0.3}};
-    ssdgs_context *context = open_context(2);
+    ssdgs_context *context = test_context(2);
     ssdgs_model *model = plain_model(context, BALL);
     double least = 1;
     put_ball(model, 0, 0.4, even_sky);
@@ -258,20 +249,20 @@ static void test_nearest(void) {
     }
     unbake__cut(&u, 0, BALL);
     for (int i = 0; i < BALL; i++) {
-        unbake__near near_by;
+        unbake__near found;
         int closer = 0;
-        near_by.at = splat[i].position;
-        near_by.who = who;
-        near_by.count = 0;
-        unbake__search(&u, 0, BALL, &near_by);
-        if (!CHECK(near_by.count == UNBAKE__NEAR)) continue;
+        found.at = splat[i].position;
+        found.who = who;
+        found.count = 0;
+        unbake__search(&u, 0, BALL, &found);
+        if (!CHECK(found.count == UNBAKE__NEAR)) continue;
         for (int j = 0; j < BALL; j++) {
             float d2 = 0;
             for (int c = 0; c < 3; c++) {
                 const float d = splat[j].position[c] - splat[i].position[c];
                 d2 += d * d;
             }
-            closer += d2 < near_by.distance2[UNBAKE__NEAR - 1];
+            closer += d2 < found.distance2[UNBAKE__NEAR - 1];
         }
         CHECK(closer < UNBAKE__NEAR);
     }
@@ -280,7 +271,7 @@ static void test_nearest(void) {
 /* Half a ball that is closed below stands on nothing: its bottom looks down. */
 static void test_bottom(void) {
     static const double down[3] = {0, 0, -1}, grey[3] = {0.2, 0.2, 0.2};
-    ssdgs_context *context = open_context(2);
+    ssdgs_context *context = test_context(2);
     ssdgs_model *model = plain_model(context, BALL);
     int right = 0;
     put_ball(model, 0, 0.4, even_sky);
@@ -301,9 +292,53 @@ static void test_bottom(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Light from the eye's side comes back from the ball's middle as albedo / pi; without light it is black. A
+   plain splat may hold linear colours, too: the albedos are the same. */
+static void test_lit(void) {
+    enum { WIDE = 33, MIDDLE = WIDE * WIDE / 2 };
+    static ssdgs_real picture[3 * WIDE * WIDE], alpha[WIDE * WIDE];
+    static const ssdgs_real eye[3] = {0, -3, 0}, middle[3] = {0, 0, 0}, up[3] = {0, 0, 1},
+                            away[3] = {0, 1, 0}, white[3] = {3, 3, 3};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, middle, up, (ssdgs_real)0.4, WIDE, WIDE);
+    const ssdgs_light light = ssdgs_light_directional(away, white);
+    ssdgs_context *context = test_context(2);
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = picture;
+    image.alpha = alpha;
+    for (int linear = 0; linear < 2; linear++) {
+        ssdgs_model *model = plain_model(context, BALL);
+        put_ball(model, 0, 0.4, even_sky);
+        if (linear) {
+            ssdgs_settings settings = *ssdgs_model_settings(model);
+            ssdgs_model *stored = model;
+            settings.transfer = SSDGS_TRANSFER_SRGB;
+            CHECK(!ssdgs_model_create(context, &settings, BALL, &model));
+            for (int i = 0; i < BALL; i++) {
+                ssdgs_gaussian g;
+                CHECK(!ssdgs_model_get(stored, i, &g));
+                for (int c = 0; c < 3; c++) g.diffuse[c] = ssdgs_srgb_decode(g.diffuse[c]);
+                CHECK(!ssdgs_model_set(model, i, &g));
+            }
+            ssdgs_model_destroy(stored);
+        }
+        unbake_options options = unbake_options_default();
+        memcpy(options.ambient, even_sky, sizeof even_sky);
+        CHECK(!unbake_model(context, &model, &options));
+        CHECK(!ssdgs_render(model, &camera, &light, 1, &image));
+        const double back = (double)(picture[3 * MIDDLE] / alpha[MIDDLE]) * 3.14159265 / 3;
+        printf("figure unbake_lit_%d %.3f\n", linear, back);
+        CHECK(fabs(back - 0.4) < 0.04);
+        CHECK(!ssdgs_render(model, &camera, NULL, 0, &image));
+        for (int i = 0; i < 3 * WIDE * WIDE; i++) CHECK(picture[i] == 0);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+}
+
 /* Wax, gloss; nothing, one Gaussian, one that is not finite; a model that is not plain. */
 static void test_edges(void) {
-    ssdgs_context *context = open_context(2);
+    ssdgs_context *context = test_context(2);
     unbake_options options = unbake_options_default();
     ssdgs_gaussian g;
     ssdgs_model *model = plain_model(context, BALL);
@@ -355,6 +390,7 @@ int main(void) {
     test_same_bits();
     test_told();
     test_plate();
+    test_lit();
     test_hues();
     test_bottom();
     test_share();

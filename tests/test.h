@@ -153,6 +153,18 @@ static inline void test_release(void *user, void *memory) {
     ((desc).allocator.allocate = test_allocate, (desc).allocator.release = test_release, \
      (desc).allocator.user = (meter))
 
+#ifdef SSDGS_H
+/* A context of its own threads; none ends the program. */
+static inline ssdgs_context *test_context(int threads) {
+    ssdgs_context_desc desc;
+    ssdgs_context *context = NULL;
+    memset(&desc, 0, sizeof desc);
+    desc.threads = threads;
+    if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+    return context;
+}
+#endif
+
 /* ---- golden files ---- */
 
 #define GOLD_ARRAYS 256

@@ -47,7 +47,7 @@ static ssdgs_result look(ssdgs_context *context, ssdgs_model *model, const doubl
     for (int i = 0; i < VIEWS && !result; i++) { /* on a spiral around the sphere */
         const double z = 1 - (2 * i + 1.0) / VIEWS, across = sqrt(1 - z * z), turn = 2.39996323 * i;
         const double away[3] = {across * cos(turn), across * sin(turn), z};
-        const ssdgs_real up[3] = {fabs(z) > 0.98, 0, fabs(z) <= 0.98};
+        const ssdgs_real steep = fabs(z) > 0.98, up[3] = {steep, 0, 1 - steep};
         ssdgs_real eye[3];
         for (int c = 0; c < 3; c++) eye[c] = middle[c] + (ssdgs_real)2.4 * size * (ssdgs_real)away[c];
         const ssdgs_camera camera = ssdgs_camera_look_at(eye, middle, up, (ssdgs_real)0.6, SIDE, SIDE);
