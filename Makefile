@@ -183,7 +183,7 @@ $(BUILD)/gpu_shaders.h: examples/gpu/shaders.awk $(wildcard examples/gpu/*.comp 
 $(BUILD)/t_check: examples/check.c
 $(BUILD)/t_relight: examples/relight.c
 $(BUILD)/t_options: examples/train.c
-$(BUILD)/hashes_64 $(BUILD)/t_scene_64 $(BUILD)/t_material_64: $(BUILD)/ssdgs_64.o
+$(BUILD)/hashes_64 $(BUILD)/t_scene_64 $(BUILD)/t_material_64 $(BUILD)/t_kept_64: $(BUILD)/ssdgs_64.o
 $(BUILD)/%_64: tests/%.c $(HEADERS) $(BUILD)/kernels_64.o
 	$(PROGRAM) -DSSDGS_REAL64 $(LINKED)
 $(BUILD)/t_gradient: tests/t_gradient.c $(HEADERS) $(BUILD)/kernels_64.o

@@ -134,6 +134,9 @@ SCENES, as engines have them: examples/engine.c is one
   light's map covers all objects of the array: leave out what is far away.
   All objects share the largest one's shadow bias: a very large model removes contact shadows of small ones.
   If models have different settings.light_scale, set object.tint to compensate.
+  Baked colours are the light of a capture. examples/unbake.h makes models of them that take light, and may
+  keep a share of them. light.kept says how much of them its shadow takes away. That is for shadows of what
+  the capture did not have: its own, which it shows already, become twice as dark.
 
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
@@ -327,10 +330,12 @@ typedef struct ssdgs_settings {
     int version;   /* set by ssdgs_settings_default / _published */
     int terms;     /* SSDGS_*_TERM mask: what the model has */
     int baked;     /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
-    int harmonics; /* degree, 0 .. 3, of the harmonics by which baked colours change with the view */
-    int transfer;  /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
-    int dipole;    /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
-    int asg;       /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
+    int harmonics; /* degree, 0 .. 3, of the harmonics by which baked and kept colours change with the view */
+    ssdgs_real kept; /* 0 .. 1: share of baked colours that a model which is not baked sends besides what its
+                        lights make of it, see ssdgs_object. Above 0 its Gaussians have them */
+    int transfer;    /* ssdgs_transfer: stored images are sRGB-encoded, or are what is blended */
+    int dipole;      /* ssdgs_dipole: eq. 5 with Jensen's distances, or as printed */
+    int asg;         /* ssdgs_asg: highlights per Gaussian (eq. 12), or per pixel (deferred) */
     int per_channel_optics;   /* 1: sigma_s and sigma_a of each colour channel; 0: one for all */
     int depth_cue;            /* 1: the scattering network sees how deep in the object a point lies */
     int transport;            /* 1: it also sees what true dipole transport brings from where light enters */
@@ -470,6 +475,9 @@ typedef struct ssdgs_light {
                          does not */
     int unshadowed;   /* not in photographs. 1: nothing is in its way, and it costs no map; light scatters as
                          beneath a plane */
+    ssdgs_real kept;  /* not in photographs. 0 .. 1: share of baked and kept colours that is this light's, and
+                         is missing in its shadow; of stored values, where all models are baked. Shares of
+                         all lights that sum to more than 1 are scaled to 1 */
 } ssdgs_light;
 
 /* Lights of each kind; what else they have, set behind that. direction: of any length. cone: angles inner and
@@ -580,6 +588,8 @@ typedef struct ssdgs_object {
                                 stays; 1 */
     ssdgs_real specular;     /* 0 or more: factor of its highlights; 1 */
     ssdgs_real translucency; /* 0.1 .. 10: factor of how far light travels in it, by true transport; 1 */
+    ssdgs_real kept;         /* 0 or more: factor of its baked colours, which it sends without any light;
+                                settings.kept, 1 of what is baked */
     const unsigned char *mask; /* (Gaussians of the model) 255: takes tint, roughness and specular whole; 0:
                                   stays as it is. Geometric lobes take roughness whole. Read in the call.
                                   NULL: all do; NULL */
@@ -800,8 +810,8 @@ SSDGS_API ssdgs_result ssdgs_compare(ssdgs_context *context, const ssdgs_real *i
 SSDGS_API ssdgs_result ssdgs_evaluate(ssdgs_model *model, const ssdgs_photo *photo,
                                       const ssdgs_real background[3], ssdgs_real *image,
                                       ssdgs_metrics *metrics);
-/* Fits photo's camera and light to its pixels by so many steps of Adam, the model fixed. ERR_ARGUMENT: it has
-   a settings.placement. */
+/* Fits photo's camera and light to its pixels by so many steps of Adam, the model fixed. How baked and kept
+   colours change with the view is not followed. ERR_ARGUMENT: it has a settings.placement. */
 SSDGS_API ssdgs_result ssdgs_refine_photo(ssdgs_model *model, ssdgs_photo *photo,
                                           const ssdgs_real background[3], int iterations);
 #endif /* SSDGS_NO_TRAINER */
@@ -833,9 +843,10 @@ enum {
 /* The raw arrays, valid until the model changes. Call ssdgs_model_arrays() before each round of writing: it
    is how rendering knows that what it has cached is out of date. */
 typedef struct ssdgs_model_view {
-    int count;                 /* Gaussians */
-    size_t stride;             /* reals from one plane to the next */
-    int channels;              /* planes: SSDGS_CHANNELS; baked: SSDGS_HARMONICS + 0, 9, 24 or 45 */
+    int count;     /* Gaussians */
+    size_t stride; /* reals from one plane to the next */
+    int channels;  /* planes: SSDGS_CHANNELS; baked: SSDGS_HARMONICS + 0, 9, 24 or 45; with settings.kept
+                      SSDGS_CHANNELS + 3 (f_dc) + 0, 9, 24 or 45 (f_rest) */
     ssdgs_real *gaussians;     /* (channels, stride): scale = exp, opacity = sigmoid, colours and weights =
                                   softplus; deferred, ssdgs_gaussian's specular is c_s sqrt(lambda mu) */
     ssdgs_real *asg_basis;     /* (SSDGS_ASG_COUNT, 4) quaternions w x y z */
@@ -988,12 +999,12 @@ typedef struct ssdgs_placed {
     ssdgs_model_view gaussians;
     int first;                                /* a multiple of 64; the gaps that this leaves are not drawn */
     int terms;                                /* to render, after settings and options */
-    int light_count;                          /* the frame's, 0 where colours are baked */
+    int light_count;                          /* the frame's; 0 where no light changes it */
     int turned;                               /* 0: rotation is the identity */
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
     uint64_t key;             /* of revision, first, rotation, scale and offset: equal where these are */
     double middle[3], radius; /* world: a ball around what it draws; no use with one object alone */
-    ssdgs_real tint[3], roughness, specular, translucency;
+    ssdgs_real tint[3], roughness, specular, translucency, kept;
     ssdgs_real medium[15];       /* RGB weights of true transport's lengths, where a medium scatters */
     const unsigned char *mask;   /* as in ssdgs_object */
     int material;                /* pixels blend and light the layers of each material by themselves */
@@ -1395,7 +1406,7 @@ typedef struct ssdgs__offsets {
 } ssdgs__offsets;
 
 typedef struct ssdgs__lighting {
-    ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth;
+    ssdgs_real light[3], eye[3], intensity[3], least_distance2, virtual_depth, kept;
     ssdgs_real basis[12 * SSDGS_ASG_COUNT]; /* deferred: t, s, a, da/d(raw a) at 8 .. 11 of each 12 */
     int directional, printed_dipole, diffuse, specular, shadow, scattering;
     int residual_shadow, refined_shadow, per_channel_optics, shadow_on_scattering, deferred;
@@ -1425,6 +1436,7 @@ typedef struct ssdgs__colour_in {
     const ssdgs_real *visibility; /* (1) */
     const ssdgs_real *shadow;     /* (1) the shadow network's output, or NULL */
     const ssdgs_real *optics;     /* (3 or 7) the scattering network's, or NULL */
+    const ssdgs_real *kept;       /* (4) kept colours and the share that is the light's, or NULL */
 } ssdgs__colour_in;
 typedef struct ssdgs__colour_gradient {
     const ssdgs_real *color, *diffuse,
@@ -2501,6 +2513,7 @@ static void ssdgs__global_groups(const ssdgs_settings *settings, size_t first[SS
     S(terms, "terms", 0, 'i', 0, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, SSDGS_ALL_TERMS, -1) \
     S(baked, "baked", 0, 'i', 0, 1, 0, 0, -1) \
     S(harmonics, "harmonics", 0, 'i', 0, 3, 0, 0, 0) \
+    S(kept, "kept", 0, 'r', 0, 1, 0, 0, 0) \
     S(transfer, "transfer", 0, 'i', 0, SSDGS_TRANSFER_NONE, SSDGS_TRANSFER_SRGB, SSDGS_TRANSFER_NONE, -1) \
     S(dipole, "dipole", 0, 'i', 0, SSDGS_DIPOLE_PRINTED, 0, 0, -1) \
     S(asg, "asg", 0, 'i', 0, SSDGS_ASG_DEFERRED, SSDGS_ASG_DEFERRED, SSDGS_ASG_GEOMETRIC, -1) \
@@ -2599,6 +2612,10 @@ static ssdgs_result ssdgs__numbers_check(ssdgs_context *context, const char *wha
     return result;
 }
 
+/* Whether Gaussians have colours, f_dc and f_rest, that no light makes; and the first plane of these. */
+static int ssdgs__keeps(const ssdgs_settings *s) { return s->baked || s->kept > 0; }
+static int ssdgs__kept_plane(const ssdgs_settings *s) { return s->baked ? SSDGS_DIFFUSE : SSDGS_CHANNELS; }
+
 static ssdgs_settings ssdgs__settings_preset(int preset) {
     ssdgs_settings s;
     memset(&s, 0, sizeof s);
@@ -2661,7 +2678,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     const int medium = ssdgs__has_medium(s, s->terms);
     for (const ssdgs__number *n = ssdgs__settings; n < ssdgs__settings + SSDGS__SETTING_COUNT; n++) {
         double low = n->low, high = n->high; /* some depend on others */
-        if (n->at == offsetof(ssdgs_settings, harmonics) && !s->baked) high = 0;
+        if (n->at == offsetof(ssdgs_settings, harmonics) && !ssdgs__keeps(s)) high = 0;
         if (n->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
         if (n->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
         if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
@@ -2761,7 +2778,8 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
     size_t bytes;
-    model->channels = s.baked ? SSDGS_HARMONICS + 3 * ssdgs__harmonics(s.harmonics) : SSDGS_CHANNELS;
+    model->channels = SSDGS_CHANNELS;
+    if (ssdgs__keeps(&s)) model->channels = ssdgs__kept_plane(&s) + 3 + 3 * ssdgs__harmonics(s.harmonics);
     if (!ssdgs__product_fits(model->capacity, (size_t)model->channels * sizeof(ssdgs_real), &bytes))
         bytes = SIZE_MAX;
     if (model->globals) model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
@@ -2771,9 +2789,9 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     }
     model->count = count;
     for (int c = 0; c < model->channels; c++) {
-        const ssdgs_real value = !s.baked || c < SSDGS_DIFFUSE ? ssdgs__neutral(c)
-                                 : c < SSDGS_HARMONICS         ? ssdgs__to_dc(ssdgs__neutral(c))
-                                                               : 0;
+        const ssdgs_real value = c < (s.baked ? SSDGS_DIFFUSE : SSDGS_CHANNELS) ? ssdgs__neutral(c)
+                                 : s.baked && c < SSDGS_HARMONICS ? ssdgs__to_dc(ssdgs__neutral(c))
+                                                                  : 0;
         for (size_t i = 0; i < (size_t)count; i++) model->gaussians[(size_t)c * model->capacity + i] = value;
     }
     ssdgs__globals_reset(model, 1);
@@ -3617,10 +3635,12 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
                           "object %d: tint[%d] = %g is negative or not finite", i, j, (double)o->tint[j]);
         SSDGS__REFUSE(!(o->roughness >= (ssdgs_real)0.1 && o->roughness <= 10) ||
                           !(o->translucency >= (ssdgs_real)0.1 && o->translucency <= 10) ||
-                          !(o->specular >= 0 && o->specular <= (ssdgs_real)1e6),
-                      "object %d: roughness = %g, specular = %g, translucency = %g, where 0.1 .. 10, "
-                      "0 .. 1e6 and 0.1 .. 10 are allowed; ssdgs_object_default() makes them 1",
-                      i, (double)o->roughness, (double)o->specular, (double)o->translucency);
+                          !(o->specular >= 0 && o->specular <= (ssdgs_real)1e6) ||
+                          !(o->kept >= 0 && o->kept <= (ssdgs_real)1e6),
+                      "object %d: roughness = %g, specular = %g, translucency = %g, kept = %g, where "
+                      "0.1 .. 10, 0 .. 1e6, 0.1 .. 10 and 0 .. 1e6 are allowed; ssdgs_object_default() sets "
+                      "them",
+                      i, (double)o->roughness, (double)o->specular, (double)o->translucency, (double)o->kept);
         if (!o->model->settings.baked) {
             SSDGS__REFUSE(first && first->settings.transfer != o->model->settings.transfer,
                           "object %d: its settings.transfer is not that of the objects before it", i);
@@ -3767,6 +3787,7 @@ static ssdgs_object ssdgs__object_alone(ssdgs_model *model) {
     object.model = model;
     for (int i = 0; i < 3; i++) object.to_world[5 * i] = object.tint[i] = 1;
     object.roughness = object.specular = object.translucency = 1;
+    if (model) object.kept = model->settings.baked ? 1 : model->settings.kept;
     return object;
 }
 
@@ -3801,9 +3822,9 @@ static void ssdgs__light_blur(const ssdgs_settings *s, int *blur, ssdgs_real *va
 
 SSDGS__SMALL_BEGIN
 
-/* Whether a light is not dark. */
+/* Whether a light is not dark, or its shadow takes from what is kept. */
 static int ssdgs__shines(const ssdgs_light *light) {
-    return light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0;
+    return light->intensity[0] > 0 || light->intensity[1] > 0 || light->intensity[2] > 0 || light->kept > 0;
 }
 
 /* Whether it has a map. */
@@ -3989,6 +4010,8 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
                       "light %d: range = %g is negative or not finite", i, (double)lights[i].range);
         SSDGS__REFUSE(!(lights[i].focus >= 0) || lights[i].focus > 1000,
                       "light %d: focus = %g is not in 0 .. 1000", i, (double)lights[i].focus);
+        SSDGS__REFUSE(!(lights[i].kept >= 0 && lights[i].kept <= 1), "light %d: kept = %g is not in 0 .. 1",
+                      i, (double)lights[i].kept);
     }
     return SSDGS_OK;
 }
@@ -4060,10 +4083,10 @@ static int ssdgs__has_transport(const ssdgs_placed *o) {
 static int ssdgs__needs_light(const ssdgs_frame *frame) {
     if (frame->maps) return 1;
     for (int i = 0; i < frame->object_count; i++) {
-        const ssdgs_settings *s = &frame->objects[i].settings;
-        const int asked = s->baked ? 0 : s->terms & frame->terms;
-        if (asked & SSDGS_SHADOW_TERM) return 1;
-        if ((asked & SSDGS_SCATTERING_TERM) && (s->depth_cue || s->transport)) return 1;
+        const ssdgs_placed *o = frame->objects + i;
+        if (!o->light_count) continue;
+        if (o->terms & SSDGS_SHADOW_TERM) return 1;
+        if ((o->terms & SSDGS_SCATTERING_TERM) && (o->settings.depth_cue || o->settings.transport)) return 1;
     }
     return 0;
 }
@@ -4156,7 +4179,7 @@ static void ssdgs__medium_weights(const ssdgs_settings *s, ssdgs_real translucen
 static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_placed *o, int light,
                                           const ssdgs__lighting *lobes) {
     static const ssdgs_light even = {
-        SSDGS_LIGHT_DIRECTIONAL, {0, 0, 0}, {1, 1, 1}, {0, 0, -1}, {0, 0}, 0, 0, 1};
+        SSDGS_LIGHT_DIRECTIONAL, {0, 0, 0}, {1, 1, 1}, {0, 0, -1}, {0, 0}, 0, 0, 1, 0};
     const ssdgs_settings *s = &o->settings;
     const ssdgs_light *from = light < frame->light_count ? frame->lights + light : &even;
     ssdgs__lighting k;
@@ -4174,7 +4197,7 @@ static ssdgs__lighting ssdgs__lighting_of(const ssdgs_frame *frame, const ssdgs_
     k.printed_dipole = s->dipole == SSDGS_DIPOLE_PRINTED;
     k.diffuse = (o->terms & SSDGS_DIFFUSE_TERM) != 0;
     k.specular = (o->terms & SSDGS_SPECULAR_TERM) != 0;
-    k.shadow = (o->terms & SSDGS_SHADOW_TERM) && !s->baked && ssdgs__casts(from);
+    k.shadow = (o->terms & SSDGS_SHADOW_TERM) && o->light_count && ssdgs__casts(from);
     k.scattering = (o->terms & SSDGS_SCATTERING_TERM) && !ssdgs__has_medium(s, o->terms);
     k.residual_shadow = s->residual_shadow;
     k.refined_shadow = s->shadow.layers > 0;
@@ -4235,6 +4258,8 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const int lights = frame->light_count;
     ssdgs__lighting *table, *pixels;
+    ssdgs_real taken = 0;
+    for (int light = 0; light < lights; light++) taken += frame->lights[light].kept;
     SSDGS__RESERVE(frame->scratch->lightings, table, ssdgs__lighting,
                    ssdgs__times(2 * ((size_t)frame->object_count + 1), (size_t)lights + 1));
     pixels = table + frame->object_count * (ptrdiff_t)(lights + 1);
@@ -4246,8 +4271,10 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
         world.rotation[0] = world.rotation[4] = world.rotation[8] = world.scale = 1;
         world.settings.length_unit *= o->scale;
         const ssdgs__lighting *own = table;
-        for (int light = 0; light <= lights; light++)
-            *table++ = ssdgs__lighting_of(frame, o, light, light ? own : NULL);
+        for (int light = 0; light <= lights; light++, table++) {
+            *table = ssdgs__lighting_of(frame, o, light, light ? own : NULL);
+            if (light < lights) table->kept = frame->lights[light].kept / (taken > 1 ? taken : 1);
+        }
         if (!lights) continue;
         for (o->material = 0; o->material < frame->material_count; o->material++)
             if (ssdgs__lit_alike(pixels + o->material * (ptrdiff_t)lights, own, lights)) break;
@@ -4286,15 +4313,20 @@ static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
     o->roughness = object->roughness;
     o->specular = object->specular;
     o->translucency = object->translucency;
+    o->kept = ssdgs__keeps(&o->settings) ? object->kept : 0;
     o->mask = object->mask;
+    if (o->settings.baked)
+        o->settings.terms &= SSDGS_SHADOW_TERM, o->settings.shadow.layers = 0; /* eq. 7's */
 }
 
 /* Puts the objects into the frame, one after the other. */
 static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *objects, int count,
-                                     int light_count) {
+                                     const ssdgs_light *lights, int light_count) {
     ssdgs_context *context = frame->context;
     ssdgs__frame_memory *m = frame->memory;
     uint64_t at = 0;
+    int taken = 0; /* by lights, of what is kept */
+    for (int i = 0; i < light_count; i++) taken |= lights[i].kept > 0;
     SSDGS__RESERVE(m->objects, frame->objects, ssdgs_placed, count + 1);
     frame->object_count = count;
     frame->settings = ssdgs_settings_default();
@@ -4317,7 +4349,7 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         SSDGS__FOLD(o.key, o.scale);
         SSDGS__FOLD(o.key, o.offset);
         o.terms = o.settings.terms & frame->options.terms;
-        o.light_count = o.settings.baked ? 0 : light_count;
+        o.light_count = o.settings.baked && !(taken && o.kept > 0) ? 0 : light_count;
         frame->light_count = o.light_count > frame->light_count ? o.light_count : frame->light_count;
         frame->terms |= o.terms;
         frame->count = o.first + o.gaussians.count;
@@ -4668,7 +4700,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
                           camera->view[8 + i] * camera->view[11]);
     if (!m->ready || training) ssdgs__frame_forget(m);
     m->ready = m->mapped = 0; /* again once the walks are done */
-    result = ssdgs__place_all(frame, request->objects, request->object_count, light_count);
+    result = ssdgs__place_all(frame, request->objects, request->object_count, request->lights, light_count);
     for (int i = 0; !result && ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
         result = ssdgs__sky_shares_of(frame->objects + i);
     if (!result) result = ssdgs__find_reach(frame);
@@ -5750,7 +5782,7 @@ typedef struct ssdgs__block_layout {
         widest;
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                                    /* within the block */
-    size_t inputs, outs, lobe, harmonics; /* scratch of both directions */
+    size_t inputs, outs, lobe, kept, harmonics; /* scratch of both directions */
     size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility,
         scratch; /* and of the backward */
 } ssdgs__block_layout;
@@ -5784,8 +5816,10 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame, const ssdgs_p
                                                                 : 1); /* only the backward asks again */
     l.outs = b * (size_t)(l.widest + 1);
     l.lobe = l.outs + b * SSDGS__OUTS;
-    l.harmonics = l.lobe + b * SSDGS__LOBE;
-    l.dgauss = l.harmonics + b * (o->settings.baked ? (size_t)(o->gaussians.channels - SSDGS_DIFFUSE) : 0);
+    l.kept = l.lobe + b * SSDGS__LOBE;
+    l.harmonics = l.kept + b * (o->kept > 0 ? 4 : 0);
+    l.dgauss = l.harmonics +
+               b * (o->kept > 0 ? (size_t)(o->gaussians.channels - ssdgs__kept_plane(&o->settings)) : 0);
     l.drows = l.dgauss + b * SSDGS_CHANNELS;
     l.dcolor = l.drows + b * SSDGS__ROWS;
     l.ddiffuse = l.dcolor + b * 3;
@@ -6308,7 +6342,7 @@ static void ssdgs__shade_ambient(const ssdgs_frame *frame, const ssdgs_placed *o
         ssdgs__network_forward(k, &net, lists, scratch + l->inputs, part + l->scattering_at);
         optics = part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
     }
-    const ssdgs__colour_in in = {gauss, rows, part + l->visibility, NULL, optics};
+    const ssdgs__colour_in in = {gauss, rows, part + l->visibility, NULL, optics, NULL};
     k->colour(lighting, &in, own);
     if (ssdgs__has_medium(&o->settings, o->terms))
         ssdgs__medium_rows(lighting, o->medium, gauss, rows, part + l->transport, own);
@@ -6336,8 +6370,7 @@ static int ssdgs__object_factors(const ssdgs_frame *frame, const ssdgs_placed *o
                                  const size_t at[SSDGS__BLOCK], ssdgs_real *gauss,
                                  ssdgs_real factors[4 * SSDGS__BLOCK]) {
     const ssdgs__lighting *k = ssdgs__lightings(frame, o) + frame->light_count;
-    const int rougher =
-        (o->terms & SSDGS_SPECULAR_TERM) && !o->settings.baked && (o->roughness < 1 || o->roughness > 1);
+    const int rougher = (o->terms & SSDGS_SPECULAR_TERM) && (o->roughness < 1 || o->roughness > 1);
     int edited = rougher || o->specular < 1 || o->specular > 1;
     for (int c = 0; c < 3; c++) edited |= o->tint[c] < 1 || o->tint[c] > 1;
     for (int s = 0; s < SSDGS__BLOCK && edited; s++) {
@@ -6368,19 +6401,22 @@ static void ssdgs__edit_rows(const ssdgs_real *factors, int rows, ssdgs_real *ou
 
 SSDGS__SMALL_END
 
-/* The colours of plain splats, as they are seen from the eye: stored values, decoded where the frame blends
-   linear light. */
-static void ssdgs__baked(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t at[SSDGS__BLOCK],
-                         const ssdgs_real *position, ssdgs_real *rows, ssdgs_real *outs) {
+/* The colours that no light makes, as they are seen from the eye: stored values, decoded where the frame
+   blends linear light, unless a baked model has linear ones. */
+static void ssdgs__kept(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t at[SSDGS__BLOCK],
+                        const ssdgs_real *position, ssdgs_real *rows, ssdgs_real *kept) {
     const ssdgs__kernels *k = frame->context->k;
-    for (int c = SSDGS_DIFFUSE; c < o->gaussians.channels; c++) {
+    const int first = ssdgs__kept_plane(&o->settings);
+    for (int c = first; c < o->gaussians.channels; c++) {
         const ssdgs_real *plane = o->gaussians.gaussians + (size_t)c * o->gaussians.stride;
-        ssdgs_real *row = rows + (c - SSDGS_DIFFUSE) * SSDGS__BLOCK;
+        ssdgs_real *row = rows + (c - first) * SSDGS__BLOCK;
         for (int s = 0; s < SSDGS__BLOCK; s++) row[s] = plane[at[s] - (size_t)o->first];
     }
-    k->harmonics(position, rows, o->settings.harmonics, ssdgs__lightings(frame, o)->eye, outs);
-    if (o->settings.transfer == SSDGS_TRANSFER_NONE && frame->settings.transfer == SSDGS_TRANSFER_SRGB)
-        k->srgb_decode(outs, outs, 3 * SSDGS__BLOCK);
+    k->harmonics(position, rows, o->settings.harmonics, ssdgs__lightings(frame, o)->eye, kept);
+    if (frame->settings.transfer == SSDGS_TRANSFER_SRGB &&
+        !(o->settings.baked && o->settings.transfer == SSDGS_TRANSFER_SRGB))
+        k->srgb_decode(kept, kept, 3 * SSDGS__BLOCK);
+    for (int i = 0; i < 3 * SSDGS__BLOCK; i++) kept[i] *= o->kept;
 }
 
 static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs__row_lists *lists,
@@ -6395,7 +6431,8 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     const int live = job->block[block].live;
     size_t at[SSDGS__BLOCK];
     for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(job, block, s);
-    const int bare = settings->baked && !frame->layer_count && !frame->diffuse; /* needs a colour alone */
+    const int bare = settings->baked && !o->light_count && !frame->layer_count &&
+                     !frame->diffuse; /* needs a colour alone */
     for (int i = 0; i < (bare ? SSDGS_ROTATION : SSDGS_CHANNELS); i++) {
         const ssdgs_real *plane = o->gaussians.gaussians + (size_t)i * o->gaussians.stride;
         const int neutral = settings->baked && i >= SSDGS_ROTATION;
@@ -6403,8 +6440,10 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             gauss[i * SSDGS__BLOCK + s] = neutral ? ssdgs__neutral(i) : plane[at[s] - (size_t)o->first];
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
-    ssdgs_real factors[4 * SSDGS__BLOCK];
+    ssdgs_real factors[4 * SSDGS__BLOCK], rest[SSDGS__BLOCK], *kept = scratch + l->kept;
     const int edited = ssdgs__object_factors(frame, o, at, gauss, factors);
+    if (o->kept > 0) ssdgs__kept(frame, o, at, gauss, scratch + l->harmonics, kept);
+    for (int s = 0; s < SSDGS__BLOCK; s++) rest[s] = 1; /* what of it no light takes for its own */
     const int medium = ssdgs__has_medium(settings, o->terms);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
     if (frame->layer_count && o->turned) ssdgs__lobe_turn(o, scratch + l->lobe);
@@ -6470,7 +6509,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         }
         for (int s = 0; limited && s < SSDGS__BLOCK; s++)
             part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)] *= reach[s];
-        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
+        for (int s = 0; lighting->kept > 0 && o->kept > 0 && s < SSDGS__BLOCK; s++) {
+            kept[3 * SSDGS__BLOCK + s] = lighting->kept * (limited ? reach[s] : 1);
+            rest[s] -= kept[3 * SSDGS__BLOCK + s];
+        }
+        const ssdgs__colour_in in = {gauss,  part + l->rows, part + l->visibility,
+                                     shadow, scattering,     lighting->kept > 0 && o->kept > 0 ? kept : NULL};
         k->colour(lighting, &in, outs);
         if (medium && job->transport)
             ssdgs__medium_rows(lighting, o->medium, gauss, part + l->rows, part + l->transport, outs);
@@ -6491,7 +6535,8 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     if (o->sky_share)
         ssdgs__shade_ambient(frame, o, l, lists, at, edited ? factors + 3 * SSDGS__BLOCK : NULL, memory,
                              scratch);
-    if (settings->baked) ssdgs__baked(frame, o, at, gauss, scratch + l->harmonics, outs);
+    for (int i = 0; o->kept > 0 && i < 3 * SSDGS__BLOCK; i++)
+        outs[i] += kept[i] * (rest[i % SSDGS__BLOCK] > 0 ? rest[i % SSDGS__BLOCK] : 0);
     if (edited) ssdgs__edit_rows(factors, 9, outs);
     if (frame->layer_count) {
         for (int i = 0; i < 3; i++)
@@ -6746,7 +6791,7 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             part + l->light_size - (size_t)l->scattering[l->scattering_layers] * SSDGS__BLOCK;
         ssdgs_real *lane_sums = job->lane_slots + (size_t)(slot * lights + light) * SSDGS__LANE_SUMS * 16;
         const int deferred = lighting->deferred && !even;
-        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering};
+        const ssdgs__colour_in in = {gauss, part + l->rows, part + l->visibility, shadow, scattering, NULL};
         memset(drows, 0, SSDGS__ROWS * SSDGS__BLOCK * sizeof *drows);
         if (even) ssdgs__ambient_backward(frame, &lamp, &in, dcolor, lane_sums);
         /* both networks' output gradients first: shadow's one row in dnet2's last, scattering's in dnet */
@@ -8417,10 +8462,11 @@ static size_t ssdgs__ply_setting(const ssdgs__ply_cursor *cursor) {
 /* Where anything else lies. */
 static ssdgs_real *ssdgs__ply_cell(const ssdgs_model *model, size_t row, const ssdgs__ply_cursor *cursor) {
     const size_t width = cursor->field->count ? (size_t)cursor->field->count : 1;
-    const int rest = cursor->word - SSDGS__PLY_REST;
+    const int dc = cursor->word - SSDGS__PLY_DC;
     if (cursor->field->kind == SSDGS__PLY_VERTEX)
         return model->gaussians +
-               (size_t)(rest < 0 ? cursor->word : SSDGS_HARMONICS + rest) * model->capacity + row;
+               (size_t)(dc < 0 ? cursor->word : ssdgs__kept_plane(&model->settings) + dc) * model->capacity +
+               row;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     return model->globals + first[cursor->field->word / 4] + row * width + (size_t)cursor->index;
@@ -8666,6 +8712,8 @@ static ssdgs_result ssdgs__ply_add_property(ssdgs__ply *ply, const ssdgs__ply_to
     ssdgs__ply_cursor cursor;
     char name[32];
     for (cursor.field = NULL; !list && property->word < 0 && ssdgs__ply_next(&cursor, element->kind);) {
+        if (*property->name.text != (unsigned char)*cursor.field->stem)
+            continue; /* saves most of the names */
         if (!ssdgs__ply_is(property->name, ssdgs__ply_name(&cursor, name))) continue;
         if (element->kind == SSDGS__PLY_VERTEX && cursor.word >= SSDGS__PLY_RGB) {
             if (property->type < SSDGS__PLY_FLOAT32 && property->type != SSDGS__PLY_UINT8 &&
@@ -8967,7 +9015,8 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
                                          ssdgs_load_stats *stats) {
     ssdgs__ply_element *element = ply->known[kind];
     const int vertex = kind == SSDGS__PLY_VERTEX, baked = vertex && model->settings.baked;
-    const int planes = baked ? SSDGS_HARMONICS : SSDGS_CHANNELS;
+    const int planes = baked ? SSDGS_HARMONICS : SSDGS_CHANNELS,
+              keeps = vertex && ssdgs__keeps(&model->settings);
     const int albedo =
         baked &&
         element->present[SSDGS_SPECULAR]; /* files up to 0.2.5 have no f_dc in kd_, but what an albedo has */
@@ -8977,12 +9026,14 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, kind);) {
         const int rest = cursor.word - SSDGS__PLY_REST;
         target->cursor = cursor;
-        if (baked && rest >= 0 && rest < 3 * ply->harmonics) {
+        if (keeps && rest >= 0 && rest < 3 * ply->harmonics) {
             const int c = ply->interleaved ? rest % 3 : rest / ply->harmonics,
                       i = ply->interleaved ? rest / 3 : rest % ply->harmonics;
             if (i >= more) continue; /* a band that is 0 */
-            target->to = model->gaussians + (size_t)(SSDGS_HARMONICS + c * more + i) * model->capacity;
-        } else if (cursor.word < planes && (element->present[cursor.word] || (baked && stats->plain))) {
+            target->to = model->gaussians +
+                         (size_t)(ssdgs__kept_plane(&model->settings) + 3 + c * more + i) * model->capacity;
+        } else if ((cursor.word < planes && (element->present[cursor.word] || (baked && stats->plain))) ||
+                   (keeps && !baked && cursor.word >= SSDGS__PLY_DC && rest < 0)) {
             target->to = ssdgs__ply_cell(model, 0, &cursor);
         } else continue;
         target++->step = vertex ? 1 : (size_t)(cursor.field->count ? cursor.field->count : 1);
@@ -9132,7 +9183,8 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     if (!result && ours) {
         ply->harmonics = ssdgs__harmonics(settings.harmonics);
         result =
-            ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, SSDGS__PLY_REST, SSDGS__PLY_REST + 3 * ply->harmonics);
+            ssdgs__ply_require(ply, SSDGS__PLY_VERTEX, settings.kept > 0 ? SSDGS__PLY_DC : SSDGS__PLY_REST,
+                               SSDGS__PLY_REST + 3 * ply->harmonics);
     }
     if (!result && !ours) ssdgs__ply_find_origin(ply, &settings);
     for (int kind = SSDGS__PLY_BASIS; kind < SSDGS__PLY_KINDS && !result; kind++) {
@@ -9448,7 +9500,7 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
                                                                            ssdgs__ply_setting(&cursor));
             *word = cursor.field->type == 'i' ? (uint32_t)(int)value : ssdgs__ply_bits(value);
         } else if (kind != SSDGS__PLY_VERTEX || cursor.word < SSDGS_CHANNELS ||
-                   cursor.word >= SSDGS__PLY_REST) {
+                   cursor.word >= (settings->kept > 0 ? SSDGS__PLY_DC : SSDGS__PLY_REST)) {
             *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
         }
         ssdgs__writer_word(writer, *word);
@@ -10846,9 +10898,10 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
         context->subject = "photograph";
     }
     for (int i = 0; !result && i <= photo->more_count; i++)
-        if (ssdgs__photo_light(photo, i)->unshadowed)
+        if (ssdgs__photo_light(photo, i)->unshadowed || ssdgs__photo_light(photo, i)->kept > 0)
             result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                                 "a photograph's lights have shadows; one of these is unshadowed");
+                                 "a photograph's lights have shadows; one of these is unshadowed, or its "
+                                 "share of kept colours is not 0");
     if (!result && !photo->pixels) result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "it has no pixels");
     if (!result && ((int)photo->format < 0 || photo->format > SSDGS_PIXELS_RGBA32F))
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "format = %d", (int)photo->format);
@@ -10978,7 +11031,7 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     int outlined = 0, empty = 0, dark = 0;
     double shown = 0;
     if (result) return result;
-    SSDGS__REFUSE(model->settings.baked, "a baked model cannot be trained: it has no reflectance");
+    SSDGS__REFUSE(ssdgs__keeps(&model->settings), "a model of baked or kept colours cannot be trained");
     SSDGS__REFUSE(ssdgs__has_medium(&model->settings, model->settings.terms),
                   "settings: scattering.layers = 0: a medium is not trained");
     SSDGS__REFUSE(photo_count < 1 || !photos,
@@ -14218,6 +14271,12 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R
                 const V f = V_MUL(V_MUL(kd, V_SET(0.31830988618379067)),
                                   V_LOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
                 V_STORE(o + c * SSDGS__BLOCK, V_FMA(f, lit, V_LOAD(o + c * SSDGS__BLOCK)));
+            }
+            if (in->kept) {
+                const V own =
+                    V_MUL(V_LOAD(in->kept + c * SSDGS__BLOCK + s), V_LOAD(in->kept + 3 * SSDGS__BLOCK + s));
+                V_STORE(o + c * SSDGS__BLOCK,
+                        V_FMA(own, k->deferred ? V_SET(1) : factor, V_LOAD(o + c * SSDGS__BLOCK)));
             }
             if (k->specular) {
                 const V ks = F(softplus)(V_LOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s));

@@ -412,6 +412,14 @@ static inline ssdgs_result adopt_model(ssdgs_context *context, ssdgs_model **mod
             for (size_t c = SSDGS_SPECULAR; c < SSDGS_SCATTERING && old && a.match[i] >= 0; c++)
                 to.gaussians[c * to.stride + i] = from->gaussians[c * from->stride + (size_t)a.match[i]];
             if (old && a.match[i] < 0) adopt__update_specular(whole, (int)i);
+            for (size_t c = SSDGS_CHANNELS; c < (size_t)to.channels; c++) { /* colours that no light makes */
+                const ssdgs_real black =
+                    c < SSDGS_CHANNELS + 3 ? (ssdgs_real)(-0.5 / 0.28209479177387814) : 0;
+                to.gaussians[c * to.stride + i] =
+                    a.match[i] >= 0                   ? from->gaussians[c * from->stride + (size_t)a.match[i]]
+                    : a.model.channels == to.channels ? a.model.gaussians[c * a.model.stride + i]
+                                                      : black;
+            }
             if (!stays) adopt__bring_back(&to, i, from, a.match[i], &a.moved, a.tolerance);
         }
         ssdgs_model_destroy(*model);

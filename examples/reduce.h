@@ -245,7 +245,7 @@ static inline void reduce__merge(const reduce__state *r, const reduce__pair *pai
     const reduce__blob *a = r->blob + pair->kept, *b = r->blob + pair->gone;
     const double sum = a->seen + b->seen, w = sum > 0 ? a->seen / sum : 0.5;
     const double share = w * a->share + (1 - w) * b->share;
-    double s[9], q[4], scale[3], raw[SSDGS_HARMONICS + 45], along = 0, length[2] = {0, 0};
+    double s[9], q[4], scale[3], raw[SSDGS_CHANNELS + 48], along = 0, length[2] = {0, 0};
     for (int i = 0; i < 9; i++)
         s[i] = w * a->covariance[i] + (1 - w) * b->covariance[i] +
                w * (1 - w) * (a->position[i / 3] - b->position[i / 3]) *

@@ -10,9 +10,11 @@ static const char program[] = "unbake";
 static int usage(void) {
     fprintf(
         stderr,
-        "usage: unbake PLAIN.ply -o LIT.ply [--ambient R,G,B] [--medium S,A] [--roughness R] [--f0 F]\n"
+        "usage: unbake PLAIN.ply -o LIT.ply [--ambient R,G,B] [--keep K]\n"
+        "              [--medium S,A] [--roughness R] [--f0 F]\n"
         "  --ambient R,G,B  the even irradiance in which it was photographed; else its brightest albedo is\n"
         "                   taken for 0.9\n"
+        "  --keep K         share, 0 .. 1, of its own light that it keeps beside its lamps'\n"
         "  --medium S,A     it is of wax or skin: reduced scattering and absorption of one world unit\n"
         "  --roughness R    it has highlights, of Beckmann's roughness 0.01 .. 1\n"
         "  --f0 F           with --roughness: what they reflect from the front, above 0, up to 1; 0.04\n");
@@ -49,6 +51,7 @@ int main(int argc, char **argv) {
         int known = 1;
         if (!strcmp(argv[i], "-o") && i + 1 < argc) to = value;
         else if (!strcmp(argv[i], "--ambient")) known = numbers(value, 3, options.ambient[0]);
+        else if (!strcmp(argv[i], "--keep")) known = numbers(value, 1, &options.kept);
         else if (!strcmp(argv[i], "--roughness")) known = numbers(value, 1, &options.roughness);
         else if (!strcmp(argv[i], "--f0")) known = numbers(value, 1, &options.f0);
         else if (!strcmp(argv[i], "--medium")) {
@@ -70,7 +73,7 @@ int main(int argc, char **argv) {
     if (!failed && !result) result = ssdgs_model_load(context, from, &model, NULL);
     if (!failed && !result && !ssdgs_model_settings(model)->baked)
         failed = olat__fail(error, "%s: is no plain splat, it takes light as it is", from);
-    if (!failed && !result && ssdgs_model_settings(model)->harmonics)
+    if (!failed && !result && ssdgs_model_settings(model)->harmonics && !(options.kept > 0))
         fprintf(stderr, "%s: %s: how its colours change with the view is left out\n", program, from);
     if (!failed && !result) result = unbake_model(context, &model, &options);
     if (!failed && !result) result = ssdgs_model_save(model, to);

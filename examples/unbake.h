@@ -42,6 +42,8 @@ typedef struct unbake_options {
     ssdgs_real absorption[3]; /* 0: it is opaque; 0 */
     ssdgs_real roughness;     /* of its highlights, 0.01 .. 1; 0: it has none; 0 */
     ssdgs_real f0;            /* what it reflects at normal incidence; 0.04 */
+    ssdgs_real kept;          /* 0 .. 1: share of its own light that it keeps beside its lamps', see
+                                 ssdgs_settings; 0 */
 } unbake_options;
 static inline unbake_options unbake_options_default(void) {
     unbake_options options;
@@ -436,6 +438,28 @@ static inline ssdgs_result unbake__find(unbake__state *u, ssdgs_context *context
     return result;
 }
 
+/* Its colours, as files have them. Linear ones are encoded, to first order in how they change with the view.
+ */
+static inline void unbake__keep(const unbake__state *u, ssdgs_model *model) {
+    const ssdgs_model_view from = ssdgs_model_peek(u->plain), to = ssdgs_model_arrays(model);
+    const size_t rest = ((size_t)from.channels - SSDGS_HARMONICS) / 3, count = (size_t)u->count;
+    const double unit = 0.28209479177387814;
+    for (size_t c = 0; c < (size_t)to.channels - SSDGS_CHANNELS; c++)
+        memcpy(to.gaussians + (SSDGS_CHANNELS + c) * to.stride,
+               from.gaussians + (SSDGS_DIFFUSE + c) * from.stride, count * sizeof *to.gaussians);
+    if (ssdgs_model_settings(u->plain)->transfer != SSDGS_TRANSFER_SRGB) return;
+    for (size_t i = 0; i < count; i++)
+        for (size_t c = 0; c < 3; c++) {
+            ssdgs_real *dc = to.gaussians + (SSDGS_CHANNELS + c) * to.stride + i;
+            const double linear = 0.5 + unit * (double)*dc,
+                         stored = (double)ssdgs_srgb_encode((ssdgs_real)linear),
+                         above = (double)ssdgs_srgb_encode((ssdgs_real)(linear + 1e-3));
+            for (size_t j = 0; j < rest; j++)
+                dc[(3 - c + c * rest + j) * to.stride] *= (ssdgs_real)((above - stored) / 1e-3);
+            *dc = (ssdgs_real)((stored - 0.5) / unit);
+        }
+}
+
 /* The model: its Gaussians are the splat's, bit for bit. */
 static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context, ssdgs_model **out) {
     const unbake_options *o = u->options;
@@ -450,6 +474,8 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
     settings.transport = translucent;
     memcpy(settings.medium.scattering, o->scattering, sizeof o->scattering);
     memcpy(settings.medium.absorption, o->absorption, sizeof o->absorption);
+    settings.kept = o->kept;
+    settings.harmonics = o->kept > 0 ? plain->harmonics : 0;
     settings.pixel_variance = plain->pixel_variance;
     settings.placement = plain->placement;
     memcpy(settings.origin, plain->origin, sizeof plain->origin);
@@ -475,11 +501,12 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
         result = ssdgs_model_set(*out, i, &g);
     }
     if (!result) unbake__copy(u, *out);
+    if (!result && o->kept > 0) unbake__keep(u, *out);
     return result;
 }
 
 /* Makes of *model, a plain splat (settings.baked), one that takes light, on the same context, destroys it and
-   puts the new one in its place. Its own light and how that changes with the view are gone. options NULL =
+   puts the new one in its place. Its own light is gone but for what options.kept says. options NULL =
    default. The same bits on any number of threads. A model that an object uses must not be given.
    ERR_ARGUMENT: it is not baked, or an option is out of range. ERR_MEMORY. Where it fails, *model is as it
    was. */

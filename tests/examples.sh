@@ -375,6 +375,8 @@ check "ball" says 1 "r_000.png: " "$build/ball" --focal 500 20 20 10 "$set/test/
 "$build/export" "$model" "$out/baked" --keep >/dev/null 2>&1
 check "unbake" says 0 "lit.ply: [0-9]* Gaussians that take light" "$build/unbake" "$out/baked.ply" -o "$out/lit.ply" --ambient 1,1,1 --medium 20,1 --roughness 0.4 --f0 0.05
 check "lit" says 0 "4 images" "$build/relight" "$out/lit.ply" "$set" --out "$out/lit" --threads 1
+check "unbake --keep" says 0 "kept.ply: " "$build/unbake" "$out/baked.ply" -o "$out/kept.ply" --keep 0.5
+check "a plain splat in an engine" says 0 "model 1: $(sed -n 's/^element vertex //p' "$out/baked.ply") Gaussians" engine --frames 1 --size 16 16 "$model" "$out/baked.ply"
 check "unbake a model" says 1 "takes light as it is" "$build/unbake" "$model" -o "$out/lit2.ply"
 check "and writes nothing" test ! -e "$out/lit2.ply"
 check "unbake onto itself" says 1 "baked.ply" "$build/unbake" "$out/baked.ply" -o "$out/baked.ply"
@@ -382,6 +384,7 @@ check "unbake nothing" says 1 "no.ply" "$build/unbake" "$out/no.ply" -o "$out/li
 for wrong in "--ambient 1,1" "--ambient 1,1,1," "--ambient -1,1,1" "--medium nan,1" "--roughness" "--lit 1" "more.ply"; do
     check "unbake $wrong" says 2 "^usage: unbake" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" $wrong
 done
+check "unbake --keep 2" says 1 "kept = 2 is not within 0 .. 1" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" --keep 2
 check "unbake --roughness 2" says 1 "roughness" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" --roughness 2
 
 rm -rf "$out"

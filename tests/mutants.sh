@@ -11,7 +11,7 @@ export SSDGS_GOLDEN MUTANT
 
 cc=${CC:-cc} quick=$(command -v tcc || echo "$cc -O0") # where compiling takes longer than running
 cp tests/t_*.c tests/scene.h "$work/tests"
-mkdir -p "$work/examples" && cp examples/*.[ch] "$work/examples"
+mkdir -p "$work/examples" && cp examples/*.[ch] "$work/examples" && ln -sfn "$PWD/examples/data" "$work/examples/data"
 # the first failed check ends a program
 sed 's/test_failed++, \(printf(.*)\);$/\1, exit(1);/' tests/test.h >"$work/tests/test.h"
 

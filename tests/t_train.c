@@ -221,7 +221,7 @@ static void test_members(ssdgs_trainer *trainer, const char *path) {
             strcat(names, wanted + 1);
             different++;
         }
-    CHECK(made == (int)sizeof(ssdgs_real) * 8 && different == 89);
+    CHECK(made == (int)sizeof(ssdgs_real) * 8 && different == 90);
     if (!CHECK(strstr(names, " seed schedule ") &&
                strstr(names, " bounds_min[0] bounds_min[1] bounds_min[2] bounds_max[0] ") &&
                strstr(names, " rates.camera.end rates.light.start rates.light.end terms ") &&
