@@ -329,9 +329,11 @@ static void load_model(void *loads, int index) {
         job->result = job->path ? ssdgs_model_load(job->context, job->path, &job->model, NULL)
                                 : make_ball(job->context, index, &job->model);
     if (!job->result && ssdgs_model_settings(job->model)->baked) { /* a plain splat: now it takes light */
+        ssdgs_model *plain = job->model;
         unbake_options options = unbake_options_default();
         options.kept = 0.2f; /* and keeps some of its own */
-        job->result = unbake_model(job->context, &job->model, &options);
+        job->result = unbake_model(job->context, plain, &options, &job->model);
+        ssdgs_model_destroy(plain);
     }
 }
 

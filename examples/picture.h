@@ -1,6 +1,6 @@
 /* picture.h - draws what a page asks for: "w=320&h=200&eye=0,-3,1&light=1,-2,2,1,1,1&plane=shadow". MIT, see
-   ssdgs.h. view.h serves such pictures, web.c draws them in the page itself. Needs ssdgs.h and olat.h before
-   it. */
+   ssdgs.h. view.h serves such pictures, web.c draws them in the page itself. Needs ssdgs.h with SSDGS_STAGES,
+   olat.h and unbake.h before it. */
 #ifndef PICTURE_H
 #define PICTURE_H
 
@@ -37,6 +37,8 @@ enum {
     VIEW__ROUGHNESS,
     VIEW__GLOSS,
     VIEW__TRANSLUCENCY,
+    VIEW__LIT,
+    VIEW__KEPT,
     VIEW__LIGHT,
     VIEW__FIELDS
 };
@@ -44,14 +46,16 @@ static const struct {
     const char *name;
     int count;
     double least, most, usual[3];
-} view__field[VIEW__FIELDS] = {
-    {"w", 1, 16, VIEW__SIDE, {256, 0, 0}}, {"h", 1, 16, VIEW__SIDE, {256, 0, 0}},
-    {"eye", 3, -1e6, 1e6, {0, -3, 1}},     {"target", 3, -1e6, 1e6, {0, 0, 0}},
-    {"up", 3, -1, 1, {0, 0, 1}},           {"angle", 1, 0.05, 2.5, {0.7, 0, 0}},
-    {"exposure", 1, 1e-3, 1e3, {1, 0, 0}}, {"ambient", 3, 0, 1e3, {0, 0, 0}},
-    {"tint", 3, 0, 100, {1, 1, 1}},        {"roughness", 1, 0.1, 10, {1, 0, 0}},
-    {"gloss", 1, 0, 100, {1, 0, 0}},       {"translucency", 1, 0.1, 10, {1, 0, 0}},
-    {"light", 6, -1e6, 1e6, {0, 0, 0}}}; /* place and colour, once for each light */
+} view__field[VIEW__FIELDS] = {{"w", 1, 16, VIEW__SIDE, {256, 0, 0}}, {"h", 1, 16, VIEW__SIDE, {256, 0, 0}},
+                               {"eye", 3, -1e6, 1e6, {0, -3, 1}},     {"target", 3, -1e6, 1e6, {0, 0, 0}},
+                               {"up", 3, -1, 1, {0, 0, 1}},           {"angle", 1, 0.05, 2.5, {0.7, 0, 0}},
+                               {"exposure", 1, 1e-3, 1e3, {1, 0, 0}}, {"ambient", 3, 0, 1e3, {0, 0, 0}},
+                               {"tint", 3, 0, 100, {1, 1, 1}},        {"roughness", 1, 0.1, 10, {1, 0, 0}},
+                               {"gloss", 1, 0, 100, {1, 0, 0}},       {"translucency", 1, 0.1, 10, {1, 0, 0}},
+                               {"lit", 1, 0, 1, {0, 0, 0}},           {"kept", 1, -1, 1, {-1, 0, 0}},
+                               {"light", 6, -1e6, 1e6, {0, 0, 0}}};
+/* light: place and colour, once for each light; lit: 1: plain splats take light; kept: what models keep of
+   their own, -1: as they say */
 
 typedef struct view__wish {
     double value[VIEW__FIELDS][3], light[VIEW__LIGHTS][6];
@@ -124,6 +128,7 @@ typedef struct view_show {
     ssdgs_context *context;
     ssdgs_model *models[VIEW__MODELS];
     const char *names[VIEW__MODELS];
+    ssdgs_model *lit[VIEW__MODELS]; /* of plain ones, once it is asked for: those that take light */
     int count;
     float middle[3], radius;
     ssdgs_object objects[VIEW__MODELS];
@@ -212,15 +217,34 @@ static int view__room(view_show *s, size_t pixels) {
     return s->pixels > 0;
 }
 
+/* What the wish shows of model i, and how much of its own light: a plain splat may take light. */
+static ssdgs_result view__choose(view_show *s, int i, const view__wish *w) {
+    const ssdgs_settings *settings = ssdgs_model_settings(s->models[i]);
+    const int lit = settings->baked && w->value[VIEW__LIT][0] > 0.5;
+    unbake_options options = unbake_options_default();
+    options.kept = 1;
+    if (lit && !s->lit[i]) {
+        const ssdgs_result result = unbake_model(s->context, s->models[i], &options, s->lit + i);
+        if (result) return result;
+    }
+    s->objects[i].model = lit ? s->lit[i] : s->models[i];
+    s->objects[i].kept = settings->baked && !lit ? 1 : settings->kept;
+    if ((lit || !settings->baked) && w->value[VIEW__KEPT][0] >= 0)
+        s->objects[i].kept = (float)w->value[VIEW__KEPT][0];
+    return SSDGS_OK;
+}
+
 static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wish *w,
                                ssdgs_render_stats *stats) {
     const int width = (int)w->value[VIEW__WIDTH][0], height = (int)w->value[VIEW__HEIGHT][0];
     const size_t pixels = (size_t)width * (size_t)height;
     const float light_scale = ssdgs_model_settings(s->models[0])->light_scale;
+    ssdgs_result result = view__room(s, pixels) ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    for (int i = 0; i < s->count && !result; i++) result = view__choose(s, i, w);
+    if (result) return result;
     int lit = 0; /* the first model that is not baked says how colours are stored */
-    while (lit < s->count && ssdgs_model_settings(s->models[lit])->baked) lit++;
-    const int transfer = ssdgs_model_settings(s->models[lit < s->count ? lit : 0])->transfer;
-    if (!view__room(s, pixels)) return SSDGS_ERR_MEMORY;
+    while (lit < s->count && ssdgs_model_settings(s->objects[lit].model)->baked) lit++;
+    const int transfer = ssdgs_model_settings(s->objects[lit < s->count ? lit : 0].model)->transfer;
     float eye[3], target[3], up[3], *value = s->planes, *alpha = s->planes + 3 * pixels;
     ssdgs_light lights[VIEW__LIGHTS];
     ssdgs_render_options options = w->preset == VIEW__EXACT     ? ssdgs_render_options_exact()
@@ -255,7 +279,7 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
         s->objects[i].translucency = (float)w->value[VIEW__TRANSLUCENCY][0];
     }
     memset(s->stages, 0, sizeof s->stages);
-    ssdgs_result result = *scene ? SSDGS_OK : ssdgs_scene_create(s->context, scene);
+    result = *scene ? SSDGS_OK : ssdgs_scene_create(s->context, scene);
     if (!result)
         result = ssdgs_scene_render(*scene, s->objects, s->count, &camera, lights, w->lights, &options,
                                     &image, stats);
@@ -290,7 +314,10 @@ static void view__about(const view_show *s, char *text, size_t room) {
         for (int c = 0; name[c] && c < 60; c++)
             olat__append(text, room, "%c",
                          name[c] >= ' ' && name[c] < 127 && !strchr("\"\\<>&", name[c]) ? name[c] : '?');
-        olat__append(text, room, "\",\"gaussians\":%d}", ssdgs_model_peek(s->models[i]).count);
+        olat__append(text, room, "\",\"gaussians\":%d,\"plain\":%s,\"kept\":%.3f}",
+                     ssdgs_model_count(s->models[i]),
+                     ssdgs_model_settings(s->models[i])->baked ? "true" : "false",
+                     (double)ssdgs_model_settings(s->models[i])->kept);
     }
     olat__append(text, room,
                  "],\"training\":%s,\"paused\":%s,\"photographs\":%d,\"iteration\":%d,\"iterations\":%d,"
@@ -358,8 +385,12 @@ OLAT__API ssdgs_result view__photograph(view_show *s, int number, size_t *size, 
     return SSDGS_OK;
 }
 
-/* Frees the pictures; models and context are the caller's. */
+/* Frees the pictures and what was made of models; these and the context are the caller's. */
 OLAT__API void view__forget(view_show *s) {
+    for (int i = 0; i < VIEW__MODELS; i++) {
+        ssdgs_model_destroy(s->lit[i]);
+        s->lit[i] = NULL;
+    }
     free(s->planes), free(s->bytes);
     s->planes = NULL;
     s->bytes = NULL;

@@ -10,6 +10,7 @@
 #include "hull.h"
 #include "judge.h"
 #include "reduce.h"
+#include "unbake.h"
 #include "picture.h"
 #include "view.h"
 #include <errno.h>

@@ -43,7 +43,7 @@ int main(int argc, char **argv) {
     const char *from = NULL, *to = NULL;
     char error[512] = "";
     ssdgs_context *context = NULL;
-    ssdgs_model *model = NULL;
+    ssdgs_model *model = NULL, *lit = NULL;
     olat_guard guard;
     for (int i = 1; i < argc; i++) {
         const char *value = i + 1 < argc ? argv[i + 1] : "";
@@ -75,13 +75,14 @@ int main(int argc, char **argv) {
         failed = olat__fail(error, "%s: is no plain splat, it takes light as it is", from);
     if (!failed && !result && ssdgs_model_settings(model)->harmonics && !(options.kept > 0))
         fprintf(stderr, "%s: %s: how its colours change with the view is left out\n", program, from);
-    if (!failed && !result) result = unbake_model(context, &model, &options);
-    if (!failed && !result) result = ssdgs_model_save(model, to);
-    if (!failed && !result) printf("%s: %d Gaussians that take light\n", to, ssdgs_model_count(model));
+    if (!failed && !result) result = unbake_model(context, model, &options, &lit);
+    if (!failed && !result) result = ssdgs_model_save(lit, to);
+    if (!failed && !result) printf("%s: %d Gaussians that take light\n", to, ssdgs_model_count(lit));
     if (failed) fprintf(stderr, "%s: %s\n", program, error);
     else if (result)
         fprintf(stderr, "%s: %s: %s\n", program, ssdgs_result_string(result), ssdgs_error_message(context));
     ssdgs_model_destroy(model);
+    ssdgs_model_destroy(lit);
     ssdgs_context_destroy(context);
     return failed || result;
 }

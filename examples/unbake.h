@@ -4,7 +4,7 @@
    #include "ssdgs.h"
    #include "unbake.h"
    ...
-   ssdgs_result result = unbake_model(context, &model, NULL);
+   ssdgs_result result = unbake_model(context, plain, NULL, &lit);
 
    HOW  Where each Gaussian sees the sky, from 32 directions, says on which side of it the air is: its
    shortest axis points there and becomes its normal. Its colour, divided by the share of the sky that it
@@ -505,22 +505,21 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
     return result;
 }
 
-/* Makes of *model, a plain splat (settings.baked), one that takes light, on the same context, destroys it and
-   puts the new one in its place. Its own light is gone but for what options.kept says. options NULL =
-   default. The same bits on any number of threads. A model that an object uses must not be given.
-   ERR_ARGUMENT: it is not baked, or an option is out of range. ERR_MEMORY. Where it fails, *model is as it
-   was. */
-static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model **model,
-                                        const unbake_options *options) {
+/* Makes *lit, a model that takes light, of a plain splat (settings.baked), which stays, on the same context.
+   Its own light is gone but for what options.kept says. options NULL = default. The same bits on any number
+   of threads. ERR_ARGUMENT: plain is not baked, or an option is out of range. ERR_MEMORY. Where it fails,
+   *lit becomes NULL. */
+static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model *plain,
+                                        const unbake_options *options, ssdgs_model **lit) {
     const unbake_options none = unbake_options_default();
     unbake__state u;
-    ssdgs_model *lit = NULL;
+    if (lit) *lit = NULL;
+    if (!context || !lit || !plain || !ssdgs_model_settings(plain)->baked) return SSDGS_ERR_ARGUMENT;
     memset(&u, 0, sizeof u);
-    if (!context || !model || !*model || !ssdgs_model_settings(*model)->baked) return SSDGS_ERR_ARGUMENT;
     u.options = options ? options : &none;
     for (int i = 0; i < 27; i++) u.told |= u.options->ambient[i / 3][i % 3] != 0;
-    u.plain = *model;
-    u.count = ssdgs_model_count(*model);
+    u.plain = plain;
+    u.count = ssdgs_model_count(plain);
     const size_t n = (size_t)u.count + 1; /* none is no failure */
     u.seen = (unsigned char *)calloc(n, UNBAKE__SKY);
     u.splat = (unbake__splat *)calloc(n, sizeof *u.splat);
@@ -532,15 +531,17 @@ static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model **mo
     u.averaged = (float *)calloc(n, 3 * sizeof *u.averaged);
     ssdgs_result result =
         u.seen && u.splat && u.tree && u.neighbours && u.tells && u.across && u.albedo && u.averaged
-            ? ssdgs_model_bounds(*model, u.low, u.high)
+            ? ssdgs_model_bounds(plain, u.low, u.high)
             : SSDGS_ERR_MEMORY;
     for (int c = 0; c < 3 && !result; c++) u.size = fmax(u.size, (double)(u.high[c] - u.low[c]));
     if (!result) result = unbake__find(&u, context);
-    if (!result) result = unbake__make(&u, context, &lit);
+    if (!result) result = unbake__make(&u, context, lit);
     free(u.seen), free(u.splat), free(u.tree), free(u.neighbours), free(u.tells), free(u.across);
     free(u.albedo), free(u.averaged);
-    ssdgs_model_destroy(result ? lit : *model);
-    if (!result) *model = lit;
+    if (result) {
+        ssdgs_model_destroy(*lit);
+        *lit = NULL;
+    }
     return result;
 }
 #endif

@@ -8,6 +8,7 @@
 #include "../ssdgs.h"
 #include "gpu/gpu_gl.c"
 #include "olat.h"
+#include "unbake.h"
 #include "picture.h"
 #include "view.h"
 

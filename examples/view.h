@@ -5,7 +5,7 @@
 
    It serves view.html on 127.0.0.1, and one picture a request, which says all that it is to show: nothing of
    a visitor is kept but what makes the next picture faster. Whoever asks by another host's name, or from
-   another page, is refused. Needs ssdgs.h, olat.h and picture.h before it. */
+   another page, is refused. Needs ssdgs.h, olat.h, unbake.h and picture.h before it. */
 #ifndef VIEW_H
 #define VIEW_H
 

@@ -7,6 +7,7 @@
 #define SSDGS_NO_THREADS
 #include "../ssdgs.h"
 #include "olat.h"
+#include "unbake.h"
 #include "picture.h"
 
 #define WEB_API(name) __attribute__((export_name(#name))) name
@@ -96,6 +97,7 @@ int web_load(const char *called, const void *bytes, size_t length) {
     ssdgs_model *model;
     ssdgs_result result = ssdgs_model_load_memory(show.context, bytes, length, &model, NULL);
     if (!result) {
+        view__forget(&show);
         ssdgs_model_destroy(show.models[0]);
         show.models[0] = model;
         show.names[0] = name;

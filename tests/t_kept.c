@@ -321,6 +321,7 @@ static void test_unbaked(ssdgs_context *context, int linear) {
     ssdgs_model *nothing = ball(context, kept_settings(0, SSDGS_ASG_DEFERRED), 0);
     settings.transfer = linear ? SSDGS_TRANSFER_SRGB : SSDGS_TRANSFER_NONE;
     ssdgs_model *model = ball(context, settings, COUNT);
+    ssdgs_model *lit = NULL;
     ssdgs_object objects[2] = {ssdgs_object_default(nothing), ssdgs_object_default(model)};
     unbake_options options = unbake_options_default();
     if (linear) { /* well above black, and changing little: the encoding is one of first order */
@@ -331,12 +332,13 @@ static void test_unbaked(ssdgs_context *context, int linear) {
     }
     draw(context, objects, 2, NULL, 0, NULL, SSDGS_ALL_TERMS, want);
     options.kept = 1;
-    CHECK(!unbake_model(context, &model, &options) && !ssdgs_model_settings(model)->baked);
-    objects[1] = ssdgs_object_default(model);
+    CHECK(!unbake_model(context, model, &options, &lit) && !ssdgs_model_settings(lit)->baked);
+    objects[1] = ssdgs_object_default(lit);
     draw(context, objects + 1, 1, NULL, 0, NULL, SSDGS_ALL_TERMS, one);
     if (linear) CHECK_NEAR(one, want, PIXELS, 1e-3, 1e-3, "encoded colours");
     else CHECK(!memcmp(one, want, sizeof one));
     ssdgs_model_destroy(nothing);
+    ssdgs_model_destroy(lit);
     ssdgs_model_destroy(model);
 }
 

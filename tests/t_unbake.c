@@ -16,6 +16,13 @@ static ssdgs_model *plain_model(ssdgs_context *context, int count) {
     return model;
 }
 
+/* The model that takes light in the place of the plain one. */
+static void unbake(ssdgs_context *context, ssdgs_model **model, const unbake_options *options) {
+    ssdgs_model *plain = *model;
+    CHECK(!unbake_model(context, plain, options, model));
+    ssdgs_model_destroy(plain);
+}
+
 /* A flat Gaussian of that normal and linear colour. */
 static void put(ssdgs_model *model, int index, const double at[3], const double normal[3], double width,
                 const double color[3]) {
@@ -104,7 +111,7 @@ static void test_ball(int threads, ssdgs_real *normals) {
     for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
         memcpy(planes + c * BALL, before.gaussians + c * before.stride, BALL * sizeof *planes);
     memcpy(options.ambient, even_sky, sizeof even_sky);
-    CHECK(!unbake_model(context, &model, &options));
+    unbake(context, &model, &options);
     CHECK(ssdgs_model_count(model) == BALL && !ssdgs_model_settings(model)->baked);
     CHECK(ssdgs_model_settings(model)->terms == (SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM));
     const ssdgs_model_view after = ssdgs_model_peek(model);
@@ -141,7 +148,7 @@ static void test_told(void) {
         double mean[3], off;
         put_ball(model, 0, 0.4, colored_sky);
         if (told) memcpy(options.ambient, colored_sky, sizeof colored_sky);
-        CHECK(!unbake_model(context, &model, &options));
+        unbake(context, &model, &options);
         CHECK(albedos(model, 0, mean, &off) == BALL);
         printf("figure unbake_told_%d %.3f %.3f\n", told, mean[0], off);
         if (told) CHECK(off < 0.05);
@@ -166,7 +173,7 @@ static void test_plate(void) {
                               i < PLATE / 2 ? -0.21 : -0.23};
         put(model, BALL + i, at, i % 2 ? up : down, 0.6 / SIDE, grey);
     }
-    CHECK(!unbake_model(context, &model, NULL));
+    unbake(context, &model, NULL);
     for (int i = BALL; i < BALL + PLATE; i++) {
         ssdgs_gaussian g;
         CHECK(!ssdgs_model_get(model, i, &g));
@@ -192,7 +199,7 @@ static void test_hues(void) {
         for (int c = 0; c < 3; c++) g.diffuse[c] = ssdgs_srgb_encode((ssdgs_real)hue[i < BALL / 2][c]);
         CHECK(!ssdgs_model_set(model, i, &g));
     }
-    CHECK(!unbake_model(context, &model, NULL));
+    unbake(context, &model, NULL);
     for (int i = 0; i < BALL; i++) {
         ssdgs_gaussian g;
         CHECK(!ssdgs_model_get(model, i, &g));
@@ -280,7 +287,7 @@ static void test_bottom(void) {
         const double at[3] = {from * cos(turn), from * sin(turn), 0};
         put(model, i, at, down, 0.022, grey);
     }
-    CHECK(!unbake_model(context, &model, NULL));
+    unbake(context, &model, NULL);
     for (int i = BALL / 2; i < BALL; i++) {
         ssdgs_gaussian g;
         CHECK(!ssdgs_model_get(model, i, &g));
@@ -324,7 +331,7 @@ static void test_lit(void) {
         }
         unbake_options options = unbake_options_default();
         memcpy(options.ambient, even_sky, sizeof even_sky);
-        CHECK(!unbake_model(context, &model, &options));
+        unbake(context, &model, &options);
         CHECK(!ssdgs_render(model, &camera, &light, 1, &image));
         const double back = (double)(picture[3 * MIDDLE] / alpha[MIDDLE]) * 3.14159265 / 3;
         printf("figure unbake_lit_%d %.3f\n", linear, back);
@@ -345,7 +352,7 @@ static void test_edges(void) {
     put_ball(model, 0, 0.4, even_sky);
     for (int c = 0; c < 3; c++) options.scattering[c] = 20, options.absorption[c] = (ssdgs_real)(c + 1);
     options.roughness = (ssdgs_real)0.3;
-    CHECK(!unbake_model(context, &model, &options));
+    unbake(context, &model, &options);
     const ssdgs_settings *settings = ssdgs_model_settings(model);
     CHECK(settings->terms == SSDGS_ALL_TERMS && settings->transport && !settings->scattering.layers);
     CHECK(settings->medium.scattering[2] > 19 && settings->medium.absorption[2] > 2);
@@ -353,14 +360,14 @@ static void test_edges(void) {
     CHECK(fabs((double)g.diffuse[0] - 0.45) < 0.02 && fabs((double)g.scattering[0] - 0.45) < 0.02);
     CHECK(g.specular[0] > 0 && fabs((double)g.f0 - 0.04) < 1e-4);
     CHECK(fabs((double)g.sharpness[0] - 1 / 0.09) < 1e-3);
-    ssdgs_model *same = model;
-    CHECK(unbake_model(context, &model, NULL) == SSDGS_ERR_ARGUMENT && model == same);
+    ssdgs_model *lit = model;
+    CHECK(unbake_model(context, model, NULL, &lit) == SSDGS_ERR_ARGUMENT && !lit);
     ssdgs_model_destroy(model);
-    CHECK(unbake_model(context, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(unbake_model(context, NULL, NULL, &lit) == SSDGS_ERR_ARGUMENT && !lit);
 
     for (int count = 0; count < 2; count++) {
         model = plain_model(context, count);
-        CHECK(!unbake_model(context, &model, NULL));
+        unbake(context, &model, NULL);
         CHECK(ssdgs_model_count(model) == count && !ssdgs_model_settings(model)->baked);
         ssdgs_model_destroy(model);
     }
@@ -370,7 +377,7 @@ static void test_edges(void) {
     view.gaussians[SSDGS_POSITION * view.stride + 7] = (ssdgs_real)NAN;
     view.gaussians[SSDGS_DIFFUSE * view.stride + 8] = (ssdgs_real)INFINITY;
     view.gaussians[SSDGS_ROTATION * view.stride + 9] = (ssdgs_real)NAN;
-    CHECK(!unbake_model(context, &model, NULL));
+    unbake(context, &model, NULL);
     view = ssdgs_model_peek(model);
     for (size_t c = SSDGS_DIFFUSE; c < SSDGS_CHANNELS; c++)
         for (size_t i = 0; i < BALL; i++)
@@ -378,9 +385,9 @@ static void test_edges(void) {
     ssdgs_model_destroy(model);
 
     model = plain_model(context, 3);
-    same = model;
+    lit = model;
     options.roughness = 2;
-    CHECK(unbake_model(context, &model, &options) == SSDGS_ERR_ARGUMENT && model == same);
+    CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
     CHECK(strstr(ssdgs_error_message(context), "roughness") != NULL);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);

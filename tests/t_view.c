@@ -6,6 +6,7 @@
 #endif
 #include "../ssdgs.h"
 #include "../examples/olat.h"
+#include "../examples/unbake.h"
 #include "../examples/picture.h"
 #include "../examples/view.h"
 #include "test.h"
@@ -377,6 +378,28 @@ static void test_plain(void) {
     CHECK(!view_arrange(&show) && view__read_wish("w=32&h=32&eye=0,-2,0", &wish, problem, sizeof problem));
     CHECK(!view__draw(&show, &scene, &wish, &stats));
     CHECK(abs(show.bytes[4 * (16 * 32 + 16)] - 127) < 3);
+    /* it takes light where that is asked for, keeps its own where that is, and is plain again */
+    static const struct {
+        const char *wish;
+        int low, high;
+    } lit[6] = {{"lit=1", 0, 0},
+                {"lit=1&kept=1", 124, 130},
+                {"lit=1&kept=0.25", 60, 68}, /* 0.214 / 4, encoded */
+                {"lit=1&light=0,-4,0,3,3,3", 20, 255},
+                {"light=0,-4,0,3,3,3", 124, 130},
+                {"kept=0", 124, 130}};
+    for (int i = 0; i < 6; i++) {
+        char all[96];
+        snprintf(all, sizeof all, "w=32&h=32&eye=0,-2,0&%s", lit[i].wish);
+        CHECK(view__read_wish(all, &wish, problem, sizeof problem) &&
+              !view__draw(&show, &scene, &wish, &stats));
+        const int grey = show.bytes[4 * (16 * 32 + 16)];
+        if (!CHECK(grey >= lit[i].low && grey <= lit[i].high)) printf("    %s: %d\n", lit[i].wish, grey);
+    }
+    char about[1024];
+    show.names[0] = show.names[1] = "plain.ply";
+    view__about(&show, about, sizeof about);
+    CHECK(strstr(about, "\"plain\":true,\"kept\":0.000}") != NULL);
     show.count = 2;
     show.radius = 0;
     CHECK(!view_arrange(&show));
@@ -390,7 +413,7 @@ static void test_plain(void) {
     CHECK(show.radius > 2.0f && fabsf(show.middle[2] - 1.5f) < 1e-3f);
     ssdgs_scene_destroy(scene);
     for (int i = 0; i < 2; i++) ssdgs_model_destroy(show.models[i]);
-    free(show.planes), free(show.bytes);
+    view__forget(&show);
 }
 
 int main(void) {

@@ -170,7 +170,8 @@ int main(int argc, char **argv) {
     for (int k = 0; k < 2 && !result; k++) {
         ssdgs_model_destroy(model);
         result = bake(argv[1], skies[k], context, &model);
-        if (!result) result = unbake_model(context, &model, &options);
+        ssdgs_model *plain = model;
+        if (!result) result = unbake_model(context, plain, &options, &model), ssdgs_model_destroy(plain);
         if (!result)
             printf(" %s %.2f |", k ? "coloured sky" : "even sky", best_score(model, &set, background));
     }
