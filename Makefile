@@ -6,7 +6,7 @@ ITERATIONS = 5000
 BENCH =
 DATA = data
 FUZZ_SECONDS = 1800
-FUZZ_TARGETS = render scene train ply checkpoint png exr unfilter inflate dataset json json_string hooks
+FUZZ_TARGETS = render scene train ply checkpoint png exr unfilter inflate dataset json json_string hooks splats
 SCENES = waxcow:black blocks:white anisometal:white
 LDLIBS = -lm -lpthread
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
@@ -98,7 +98,7 @@ test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.htm
 test-gltf: $(BUILD)/train $(BUILD)/export ## an exported GLB before Khronos' validator; needs node, npm and its registry
 	sh tests/gltf.sh $(BUILD)
 
-test-editors: $(BUILD)/relight $(BUILD)/export ## models that went through an editor of splats, splat-transform; needs node, npm and its registry
+test-editors: $(BUILD)/relight $(BUILD)/export $(BUILD)/unbake ## models that went through an editor of splats, splat-transform; needs node, npm and its registry
 	sh tests/editors.sh $(BUILD)
 
 test-plain: $(BUILD)/relight ## plain splats with spherical harmonics beside Spark in headless Chromium; needs node, npm, its registry and chromium

@@ -159,9 +159,10 @@ MACROS, defined before the header; those with * in every file that includes it
 
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
-  unbake.h models that take light of plain splats, adopt.h mends edited models, olat.h reads datasets,
-  images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3. Nothing finds cameras or lights (options.refine
-  corrects small errors), traces light between objects, undistorts lenses, or compresses models.
+  unbake.h models that take light of plain splats, splats.h reads packed ones, adopt.h mends edited models,
+  olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3. Nothing finds cameras or
+  lights (options.refine corrects small errors), traces light between objects, undistorts lenses, or
+  compresses models.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
@@ -5012,8 +5013,8 @@ static void ssdgs__bin_count_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
     const ssdgs_splat_view *v = frame->views + view;
-    ssdgs_instances *of_rank = (ssdgs_instances *)ssdgs__bin_memory(frame, view) + frame->count;
     if (v->cached) return;
+    ssdgs_instances *of_rank = (ssdgs_instances *)ssdgs__bin_memory(frame, view) + frame->count;
     uint32_t *histogram = ssdgs__histogram(frame, view, chunk);
     memset(histogram, 0, sizeof *histogram * (size_t)(v->tiles_x * v->tiles_y));
     int begin, end;
@@ -5052,9 +5053,9 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
 static void ssdgs__bin_scatter_task(void *data, int index) {
     const ssdgs_frame *frame = (const ssdgs_frame *)data;
     const int view = frame->batch[0] + index / SSDGS__BIN_CHUNKS, chunk = index % SSDGS__BIN_CHUNKS;
-    const ssdgs_instances *of_rank = (const ssdgs_instances *)ssdgs__bin_memory(frame, view) + frame->count;
     const ssdgs_splat_view *v = frame->views + view;
     if (v->cached) return;
+    const ssdgs_instances *of_rank = (const ssdgs_instances *)ssdgs__bin_memory(frame, view) + frame->count;
     uint32_t *place = ssdgs__histogram(frame, view, chunk);
     int begin, end;
     ssdgs__bin_range(v->visible, chunk, &begin, &end);
@@ -9150,9 +9151,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
 
     if (ssdgs__ply_has(ply, vertex, "packed_position"))
         return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
-                           "%s: a compressed PLY (packed_position): convert it to a plain one, with "
-                           "splat-transform say",
-                           ply->name);
+                           "%s: a compressed PLY (packed_position): examples/splats.h reads it", ply->name);
     if (ssdgs__ply_has(ply, vertex, "filter_3D"))
         return ssdgs__fail(
             ply->context, SSDGS_ERR_FORMAT,

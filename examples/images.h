@@ -172,7 +172,7 @@ static void olat__stored(olat__inflater *z) {
     else if ((p[0] ^ p[2]) != 255 || (p[1] ^ p[3]) != 255)
         olat__bad(z, "a stored block's length and its complement disagree");
     else if ((length = (size_t)(p[0] | p[1] << 8)) > left - 4) olat__bad(z, "the data end early");
-    else if (length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
+    else if (length > z->capacity - z->length) olat__bad(z, "more data than are needed");
     else {
         memcpy(z->out + z->length, p + 4, length);
         z->at += 4 + length;
@@ -221,7 +221,7 @@ static void olat__compressed(olat__inflater *z) {
         int symbol = olat__symbol(z, &z->literals);
         if (symbol == 256) return;
         if (symbol < 256) {
-            if (z->length == z->capacity) olat__bad(z, "more data than the image needs");
+            if (z->length == z->capacity) olat__bad(z, "more data than are needed");
             else z->out[z->length++] = (unsigned char)symbol;
             continue;
         }
@@ -239,22 +239,16 @@ static void olat__compressed(olat__inflater *z) {
         const size_t distance =
             (size_t)(olat__distance_base[symbol] + olat__take(z, olat__distance_extra(symbol)));
         if (distance > z->length) olat__bad(z, "a distance reaches before the data");
-        if ((size_t)length > z->capacity - z->length) olat__bad(z, "more data than the image needs");
+        if ((size_t)length > z->capacity - z->length) olat__bad(z, "more data than are needed");
         for (; length > 0 && !z->problem; length--, z->length++)
             z->out[z->length] = z->out[z->length - distance];
     }
 }
 
-/* Unpacks a zlib stream of exactly z->capacity bytes, or of fewer where that is allowed; returns NULL or what
- * is wrong. */
-static const char *olat__inflate(olat__inflater *z) {
-    int last = 0;
-    if (z->size < 6) return "the data end early";
-    if ((z->in[0] & 15) != 8 || z->in[0] >> 4 > 7 || (z->in[0] * 256 + z->in[1]) % 31 != 0 ||
-        (z->in[1] & 32) != 0) {
-        return "a bad zlib header";
-    }
-    for (z->at = 2; !last && !z->problem;) {
+/* Unpacks a stream without a header, from z->at on, to exactly z->capacity bytes, or to fewer where that is
+   allowed; z->at becomes its end. Returns NULL or what is wrong. */
+static const char *olat__unpack(olat__inflater *z) {
+    for (int last = 0; !last && !z->problem;) {
         last = olat__take(z, 1);
         const int type = olat__take(z, 2);
         if (z->problem) break;
@@ -266,9 +260,21 @@ static const char *olat__inflate(olat__inflater *z) {
             olat__compressed(z);
         }
     }
-    if (z->problem) return z->problem;
-    if (z->length < z->capacity && !z->may_be_less) return "less data than the image needs";
-    if (olat__align(z) < 4) return "the data end early";
+    olat__align(z);
+    if (!z->problem && z->length < z->capacity && !z->may_be_less) olat__bad(z, "less data than are needed");
+    return z->problem;
+}
+
+/* The same of a zlib stream. */
+static const char *olat__inflate(olat__inflater *z) {
+    if (z->size < 6) return "the data end early";
+    if ((z->in[0] & 15) != 8 || z->in[0] >> 4 > 7 || (z->in[0] * 256 + z->in[1]) % 31 != 0 ||
+        (z->in[1] & 32) != 0) {
+        return "a bad zlib header";
+    }
+    z->at = 2;
+    if (olat__unpack(z)) return z->problem;
+    if (z->size - z->at < 4) return "the data end early";
     return olat__be32(z->in + z->at) == olat__adler32(z->out, z->length) ? NULL
                                                                          : "the Adler checksum is wrong";
 }
@@ -739,8 +745,7 @@ static const char *olat__png_read(olat__png *png, const unsigned char *bytes, si
     const uint64_t out_size = (uint64_t)png->width * (uint64_t)png->height * (png->depth == 16 ? 8 : 4);
     png->unit = "byte of the compressed data";
     png->at = png->packed_size;
-    if (raw_size / 1032 > png->packed_size)
-        return "less data than the image needs"; /* deflate packs no better */
+    if (raw_size / 1032 > png->packed_size) return "less data than are needed"; /* deflate packs no better */
     if (raw_size > SIZE_MAX || out_size > SIZE_MAX) return "out of memory";
     png->raw = (unsigned char *)malloc((size_t)raw_size);
     png->out = (unsigned char *)malloc((size_t)out_size);
@@ -1274,13 +1279,13 @@ static void olat__exr_runs(olat__exr *e, const unsigned char *in, size_t size, s
         const size_t count = literal ? 256u - in[i] : in[i] + 1u, bytes = literal ? count : 1;
         i++;
         if (bytes > size - i) olat__exr_bad(e, "a run ends early");
-        else if (count > capacity - length) olat__exr_bad(e, "more data than the image needs");
+        else if (count > capacity - length) olat__exr_bad(e, "more data than are needed");
         else if (literal) memcpy(e->turned + length, in + i, count);
         else memset(e->turned + length, in[i], count);
         i += bytes;
         length += count;
     }
-    if (!e->problem && length < capacity) olat__exr_bad(e, "less data than the image needs");
+    if (!e->problem && length < capacity) olat__exr_bad(e, "less data than are needed");
 }
 
 /* Bits of PIZ, the highest of a byte first. */
@@ -1394,11 +1399,11 @@ static void olat__piz_words(olat__exr *e, const unsigned char *in, size_t size, 
         size_t run = symbol == high ? (size_t)olat__bits_take(e, &b, 8) : 1;
         const uint16_t word = symbol < high ? (uint16_t)symbol : length ? words[length - 1] : 0;
         if (symbol == high && !length) olat__exr_bad(e, "a repeat before the first word");
-        if (run > count - length) olat__exr_bad(e, "more data than the image needs");
+        if (run > count - length) olat__exr_bad(e, "more data than are needed");
         for (; run > 0 && !e->problem; run--) words[length++] = word;
     }
     if (8 * (uint64_t)(b.at - begin) - (uint64_t)b.count != bits)
-        olat__exr_bad(e, "more data than the image needs");
+        olat__exr_bad(e, "more data than are needed");
 }
 
 /* A mean and a difference become the two words that they were made of. */
@@ -1650,7 +1655,7 @@ static void olat__exr_read(olat__exr *e, olat__found *found) {
     }
     if (width * height * e->pixel_size / (e->packing == 5 ? 1376 : 1032) > e->size ||
         blocks > (e->size - e->at) / 8 || (e->several && blocks > e->blocks)) {
-        olat__exr_bad(e, "less data than the image needs"); /* deflate packs no better */
+        olat__exr_bad(e, "less data than are needed"); /* deflate packs no better */
         return;
     }
     const unsigned char *table = olat__exr_take(e, 8 * (size_t)blocks);

@@ -1,8 +1,10 @@
-/* cc -O2 examples/unbake.c -o unbake -lm -lpthread: a plain splat file becomes a model that takes light. */
+/* cc -O2 examples/unbake.c -o unbake -lm -lpthread: a plain splat, PLY or
+   packed (splats.h), becomes a model that takes light. */
 #define SSDGS_IMPLEMENTATION
 #define SSDGS_NO_TRAINER
 #include "../ssdgs.h"
 #include "olat.h"
+#include "splats.h"
 #include "unbake.h"
 
 static const char program[] = "unbake";
@@ -10,8 +12,9 @@ static const char program[] = "unbake";
 static int usage(void) {
     fprintf(
         stderr,
-        "usage: unbake PLAIN.ply -o LIT.ply [--ambient R,G,B] [--keep K]\n"
+        "usage: unbake PLAIN -o LIT.ply [--ambient R,G,B] [--keep K]\n"
         "              [--medium S,A] [--roughness R] [--f0 F]\n"
+        "  PLAIN            PLY, compressed PLY, or SPZ up to version 3\n"
         "  --ambient R,G,B  the even irradiance in which it was photographed; else its brightest albedo is\n"
         "                   taken for 0.9\n"
         "  --keep K         share, 0 .. 1, of its own light that it keeps beside its lamps'\n"
@@ -70,7 +73,7 @@ int main(int argc, char **argv) {
     int failed = olat_guard_input(&guard, from, error) || olat_guard_output(&guard, to, error);
     olat_guard_free(&guard);
     ssdgs_result result = failed ? SSDGS_OK : ssdgs_context_create(NULL, &context);
-    if (!failed && !result) result = ssdgs_model_load(context, from, &model, NULL);
+    if (!failed && !result) failed = splats_load(context, from, &model, NULL, error);
     if (!failed && !result && !ssdgs_model_settings(model)->baked)
         failed = olat__fail(error, "%s: is no plain splat, it takes light as it is", from);
     if (!failed && !result && ssdgs_model_settings(model)->harmonics && !(options.kept > 0))

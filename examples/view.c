@@ -8,6 +8,7 @@
 #include "../ssdgs.h"
 #include "gpu/gpu_gl.c"
 #include "olat.h"
+#include "splats.h"
 #include "unbake.h"
 #include "picture.h"
 #include "view.h"
@@ -65,13 +66,13 @@ int main(int argc, char **argv) {
         printf("on %s\n", gpu_name(device));
     } else if (wants_gpu) fprintf(stderr, "view: %s: the CPU renders\n", error);
     ssdgs_result result = ssdgs_context_create(&desc, &s.show.context);
-    for (int i = 0; i < s.show.count && !result; i++) {
+    for (int i = 0; i < s.show.count && !result && !failed; i++) {
         ssdgs_load_stats read;
-        result = ssdgs_model_load(s.show.context, s.show.names[i], s.show.models + i, &read);
-        if (!result) tell(s.show.names[i], s.show.models[i], &read);
+        failed = splats_load(s.show.context, s.show.names[i], s.show.models + i, &read, error);
+        if (!failed) tell(s.show.names[i], s.show.models[i], &read);
     }
-    if (!result) result = view_arrange(&s.show);
-    if (!result && !*page && view_page(__FILE__, argv[0], page, sizeof page, error)) failed = 1;
+    if (!result && !failed) result = view_arrange(&s.show);
+    if (!result && !failed && !*page && view_page(__FILE__, argv[0], page, sizeof page, error)) failed = 1;
     if (!result && !failed) failed = view_open(&s, page, error);
     if (!result && !failed) {
         signal(SIGINT, end);

@@ -7,6 +7,7 @@
 #define SSDGS_NO_THREADS
 #include "../ssdgs.h"
 #include "olat.h"
+#include "splats.h"
 #include "unbake.h"
 #include "picture.h"
 
@@ -90,12 +91,21 @@ int web_start(int threads) {
     return ssdgs_context_create(&desc, &show.context);
 }
 
-/* The model of a PLY file instead of the one before, which stays if this one cannot be read. The note says
-   what the page must know of it. */
+/* The model of a PLY file, or a packed one, instead of the one before, which stays if this one cannot be
+   read. The note says what the page must know of it. */
 int WEB_API(web_load)(const char *called, const void *bytes, size_t length);
 int web_load(const char *called, const void *bytes, size_t length) {
-    ssdgs_model *model;
-    ssdgs_result result = ssdgs_model_load_memory(show.context, bytes, length, &model, NULL);
+    ssdgs_model *model = NULL;
+    unsigned char *plain = NULL;
+    size_t plain_size = 0;
+    char error[512];
+    if (splats_unpack(called, (const unsigned char *)bytes, length, &plain, &plain_size, error)) {
+        snprintf(note, sizeof note, "%s", error);
+        return SSDGS_ERR_FORMAT;
+    }
+    ssdgs_result result = ssdgs_model_load_memory(show.context, plain ? plain : bytes,
+                                                  plain ? plain_size : length, &model, NULL);
+    free(plain);
     if (!result) {
         view__forget(&show);
         ssdgs_model_destroy(show.models[0]);

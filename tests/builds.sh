@@ -33,7 +33,7 @@ compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax
 for example in train relight minimal engine export view check ball unbake bench; do # each is a program of its own
     compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only
 done
-for header in files json images flip olat judge reduce sky unbake; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
+for header in files json images flip olat judge reduce sky splats unbake; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
     case $header in files | json) : ;; *) echo '#include "ssdgs.h"' ;; esac >"$build/header.c"
     printf '#include "examples/%s.h"\nint main(void) { return 0; }\n' "$header" >>"$build/header.c"
     compiles "$header.h alone" "$build/header.c" "$@" -I.

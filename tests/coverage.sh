@@ -12,7 +12,7 @@ for counts in "$build"/*.gcda; do
     # one line of source on each: "branches": [{... "count": N, ...}, ...], "count": N, "line_number": N, ..., "function_name": "..."
     gcov -b --json-format --stdout "$counts" 2>/dev/null | sed 's/"branches": \[/\n&/g'
 done | awk '
-    match($0, /"function_name": "(ssdgs|olat|reduce|unbake|sky|hull|judge)_[a-z0-9_]*"/) {
+    match($0, /"function_name": "(ssdgs|olat|reduce|unbake|splats|sky|hull|judge)_[a-z0-9_]*"/) {
         name = substr($0, RSTART + 18, RLENGTH - 19)
         match($0, /"line_number": [0-9]+/)
         line = substr($0, RSTART + 15, RLENGTH - 15)

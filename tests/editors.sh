@@ -108,5 +108,15 @@ moved_along; thin=$(score "$work/half.ply")
 check "thinned: $thin dB" awk -v a="$thin" -v b="$whole" 'BEGIN { exit !(a > 5 && a < b - 3) }'
 as_good "$thin" -V rot_1,gt,0 -m -r 10,0,-60
 as_good "$half" -t 1,1,1 -B -8,-8,-8,1.1,10,10
+# packed: its compressed PLY is read as it reads it itself
+packs() {
+    "$build/export" "$model" "$work/plain" --keep >"$work/log" 2>&1 &&
+        "$work/node_modules/.bin/splat-transform" -q -w "$work/plain.ply" "$work/packed.compressed.ply" >"$work/log" 2>&1 &&
+        "$work/node_modules/.bin/splat-transform" -q -w "$work/packed.compressed.ply" "$work/unpacked.ply" >"$work/log" 2>&1
+}
+check "splat-transform packs" packs
+check "unbake its compressed PLY" "$build/unbake" "$work/packed.compressed.ply" -o "$work/lit.ply" --keep 1
+check "unbake what it unpacks" "$build/unbake" "$work/unpacked.ply" -o "$work/lit2.ply" --keep 1
+check "the same model" cmp "$work/lit.ply" "$work/lit2.ply"
 echo "$passed passed, $failed failed"
 [ $failed -eq 0 ]

@@ -377,6 +377,9 @@ check "unbake" says 0 "lit.ply: [0-9]* Gaussians that take light" "$build/unbake
 check "lit" says 0 "4 images" "$build/relight" "$out/lit.ply" "$set" --out "$out/lit" --threads 1
 check "unbake --keep" says 0 "kept.ply: " "$build/unbake" "$out/baked.ply" -o "$out/kept.ply" --keep 0.5
 check "a plain splat in an engine" says 0 "model 1: $(sed -n 's/^element vertex //p' "$out/baked.ply") Gaussians" engine --frames 1 --size 16 16 "$model" "$out/baked.ply"
+printf 'NGSP\004\000\000\000' >"$out/new.spz"
+check "unbake a newer SPZ" says 1 "new.spz: SPZ of version 4 or later" "$build/unbake" "$out/new.spz" -o "$out/lit2.ply"
+check "view a newer SPZ" says 1 "new.spz: SPZ of version 4 or later" "$build/view" "$out/new.spz"
 check "unbake a model" says 1 "takes light as it is" "$build/unbake" "$model" -o "$out/lit2.ply"
 check "and writes nothing" test ! -e "$out/lit2.ply"
 check "unbake onto itself" says 1 "baked.ply" "$build/unbake" "$out/baked.ply" -o "$out/baked.ply"

@@ -3002,7 +3002,7 @@ static void test_exr_layers(void) {
                    {codes + 2, 1, "bad codes"},
                    {codes + 2, 2, "codes of unknown words"},
                    {codes + 1, 255, "too many code lengths"},
-                   {codes + 12, 1, "more data than the image needs"},
+                   {codes + 12, 1, "more data than are needed"},
                    {codes + 14, 255, "the data end early"},
                    {codes + 20, 0x20, "bad codes"},
                    {codes + 20, (unsigned char)(file[codes + 20] ^ 0xE8), "a code is longer than 57 bits"}};

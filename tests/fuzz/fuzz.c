@@ -7,6 +7,7 @@
 #include "../../examples/olat.h"
 #include "../../examples/reduce.h"
 #include "../../examples/sky.h"
+#include "../../examples/splats.h"
 
 #define HOLDS(condition) ((condition) ? (void)0 : broken(__LINE__, #condition))
 
@@ -136,6 +137,7 @@ static void more_settings(input *in, ssdgs_settings *s) {
         s->ambient[i] = draw_size(in, 0, 1);
         s->origin[i] = draw_real(in, 0, 2);
     }
+    if (!s->baked && flags & 8) s->kept = draw_size(in, 0.5, 1), s->harmonics = s->kept > 0 ? flags >> 6 : 0;
 }
 
 /* NULL where the settings are refused. more: where the rest of them is drawn, or NULL. */
@@ -213,6 +215,7 @@ static void more_light(input *in, ssdgs_light *light) {
     light->cone[1] = light->cone[0] + draw_size(in, 0.3, 2);
     light->range = draw_size(in, 0, 5);
     light->focus = draw_size(in, 0, 20);
+    if (flags & 8) light->kept = draw_size(in, 0.5, 1);
 }
 
 static int all_finite(const ssdgs_real *values, size_t count) {
@@ -467,7 +470,8 @@ static void edit_model(input *in, ssdgs_model **given) {
     }
     if (flags & 4) {
         const int most = draw_below(in, 10), finite = model_finite(model);
-        if (done(context, reduce_model(context, given, most)))
+        if (!most) HOLDS(reduce_model(context, given, most) == SSDGS_ERR_ARGUMENT); /* without a message */
+        else if (done(context, reduce_model(context, given, most)))
             HOLDS(before <= most ? (*given)->count == before : (*given)->count <= most);
         model = *given;
         if (finite) HOLDS(model_finite(model));
@@ -515,6 +519,7 @@ static void fuzz_scene(const unsigned char *data, size_t size) {
         if (flags & 8) edit_model(&in, models + (flags & 1));
         for (int i = 0; i < p.object_count; i++)
             if (edited[i]) p.objects[i].model = models[flags & 1];
+        for (int i = 0; i < p.object_count && flags & 64; i++) p.objects[i].kept = draw_size(&in, 1, 3);
         p.passes = draw(&in);
         ssdgs_occluder occluder = {occlude, &p, 0};
         occluder.revision = (uint64_t)p.passes;
@@ -850,6 +855,31 @@ static void fuzz_unfilter(const unsigned char *data, size_t size) {
     olat__png_unfilter(&png);
     free(png.raw);
     free(png.out);
+}
+
+/* A packed splat file; behind a first byte of 0 what gzip would hold of one, whose checksum no fuzzer finds.
+   What is made of it is a plain PLY that loads, and only with room that is lacking it does not. */
+static void fuzz_splats(const unsigned char *data, size_t size) {
+    unsigned char *copy = copy_of(data, size), *plain = NULL;
+    const int bare = size && !data[0];
+    char error[512] = "";
+    splats__ply p;
+    memset(&p, 0, sizeof p);
+    const int failed = bare ? splats__spz("x", copy + 1, size - 1, &p, error)
+                            : splats_unpack("x", copy, size, &plain, &p.size, error);
+    if (bare && !failed) plain = p.bytes;
+    HOLDS(failed ? !plain && !strncmp(error, "x: ", 3) : !error[0]);
+    if (plain) {
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        HOLDS(!ssdgs_context_create(NULL, &context));
+        HOLDS(!ssdgs_model_load_memory(context, plain, p.size, &model, NULL));
+        HOLDS(ssdgs_model_settings(model)->baked);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+    free(plain);
+    free(copy);
 }
 
 /* Two bytes of capacity, then the stream; what comes out is packed, and unpacked again. */
@@ -1256,11 +1286,11 @@ typedef struct target {
     void (*run)(const unsigned char *data, size_t size);
 } target;
 static const target targets[] = {
-    {"png", fuzz_png},         {"exr", fuzz_exr},     {"unfilter", fuzz_unfilter},
-    {"inflate", fuzz_inflate}, {"json", fuzz_json},   {"json_string", fuzz_json_string},
-    {"dataset", fuzz_dataset}, {"ply", fuzz_ply},     {"checkpoint", fuzz_checkpoint},
-    {"render", fuzz_render},   {"scene", fuzz_scene}, {"train", fuzz_train},
-    {"hooks", fuzz_hooks}};
+    {"png", fuzz_png},         {"exr", fuzz_exr},      {"unfilter", fuzz_unfilter},
+    {"inflate", fuzz_inflate}, {"json", fuzz_json},    {"json_string", fuzz_json_string},
+    {"dataset", fuzz_dataset}, {"ply", fuzz_ply},      {"checkpoint", fuzz_checkpoint},
+    {"render", fuzz_render},   {"scene", fuzz_scene},  {"train", fuzz_train},
+    {"hooks", fuzz_hooks},     {"splats", fuzz_splats}};
 
 /* The target that is a name in the path, the last of those. */
 static const target *find_target(const char *path) {
