@@ -12,11 +12,12 @@ static const char program[] = "unbake";
 static int usage(void) {
     fprintf(
         stderr,
-        "usage: unbake PLAIN -o LIT.ply [--ambient R,G,B] [--keep K]\n"
+        "usage: unbake PLAIN -o LIT.ply [--ambient R,G,B] [--eye X,Y,Z ...] [--keep K]\n"
         "              [--medium S,A] [--roughness R] [--f0 F]\n"
         "  PLAIN            PLY, compressed PLY, or SPZ up to version 3\n"
         "  --ambient R,G,B  the even irradiance in which it was photographed; else its brightest albedo is\n"
         "                   taken for 0.9\n"
+        "  --eye X,Y,Z      it is a room, photographed from there; up to 32 times\n"
         "  --keep K         share, 0 .. 1, of its own light that it keeps beside its lamps'\n"
         "  --medium S,A     it is of wax or skin: reduced scattering and absorption of one world unit\n"
         "  --roughness R    it has highlights, of Beckmann's roughness 0.01 .. 1\n"
@@ -24,8 +25,8 @@ static int usage(void) {
     return 2;
 }
 
-/* Numbers with commas between them, all finite and 0 or more. */
-static int numbers(const char *text, int count, ssdgs_real *out) {
+/* Numbers with commas between them, all finite and at least so much. */
+static int numbers(const char *text, int count, double least, ssdgs_real *out) {
     char copy[256], *at = copy;
     if (strlen(text) >= sizeof copy) return 0;
     strcpy(copy, text);
@@ -34,7 +35,7 @@ static int numbers(const char *text, int count, ssdgs_real *out) {
         double value;
         if (!comma != (i == count - 1)) return 0;
         if (comma) *comma = 0;
-        if (!olat_argument(at, &value) || value < 0 || value > 1e6) return 0;
+        if (!olat_argument(at, &value) || value < least || value > 1e6) return 0;
         out[i] = (ssdgs_real)value;
         if (comma) at = comma + 1;
     }
@@ -42,6 +43,7 @@ static int numbers(const char *text, int count, ssdgs_real *out) {
 }
 
 int main(int argc, char **argv) {
+    static ssdgs_real eyes[UNBAKE__SKY][3];
     unbake_options options = unbake_options_default();
     const char *from = NULL, *to = NULL;
     char error[512] = "";
@@ -53,15 +55,17 @@ int main(int argc, char **argv) {
         ssdgs_real medium[2];
         int known = 1;
         if (!strcmp(argv[i], "-o") && i + 1 < argc) to = value;
-        else if (!strcmp(argv[i], "--ambient")) known = numbers(value, 3, options.ambient[0]);
-        else if (!strcmp(argv[i], "--keep")) known = numbers(value, 1, &options.kept);
-        else if (!strcmp(argv[i], "--roughness")) known = numbers(value, 1, &options.roughness);
-        else if (!strcmp(argv[i], "--f0")) known = numbers(value, 1, &options.f0);
+        else if (!strcmp(argv[i], "--ambient")) known = numbers(value, 3, 0, options.ambient[0]);
+        else if (!strcmp(argv[i], "--keep")) known = numbers(value, 1, 0, &options.kept);
+        else if (!strcmp(argv[i], "--roughness")) known = numbers(value, 1, 0, &options.roughness);
+        else if (!strcmp(argv[i], "--f0")) known = numbers(value, 1, 0, &options.f0);
         else if (!strcmp(argv[i], "--medium")) {
-            known = numbers(value, 2, medium);
+            known = numbers(value, 2, 0, medium);
             for (int c = 0; c < 3 && known; c++)
                 options.scattering[c] = medium[0], options.absorption[c] = medium[1];
-        } else if (argv[i][0] != '-' && !from) {
+        } else if (!strcmp(argv[i], "--eye") && options.eye_count < UNBAKE__SKY)
+            known = numbers(value, 3, -1e6, eyes[options.eye_count++]);
+        else if (argv[i][0] != '-' && !from) {
             from = argv[i];
             continue;
         } else known = 0;
@@ -69,6 +73,7 @@ int main(int argc, char **argv) {
         i++;
     }
     if (!from || !to) return usage();
+    options.eyes = (const ssdgs_real(*)[3])eyes;
     memset(&guard, 0, sizeof guard);
     int failed = olat_guard_input(&guard, from, error) || olat_guard_output(&guard, to, error);
     olat_guard_free(&guard);

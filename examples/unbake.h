@@ -9,7 +9,7 @@
    HOW  Where each Gaussian sees the sky, from 32 directions, says on which side of it the air is: its
    shortest axis points there and becomes its normal. Its colour, divided by the share of the sky that it
    sees, becomes its albedo, averaged over neighbours of its hue. What things stand on was photographed from
-   above: no direction from below it counts.
+   above: no direction from below it counts. A room is looked at from places in it, which options name.
 
    HOW WELL  Trained models, baked under an even sky and lit again by the lamps of their test photographs
    (tests/unbaked.c), had 25 dB where things are matt, 34 where they are of wax that options tell, and 22
@@ -44,6 +44,9 @@ typedef struct unbake_options {
     ssdgs_real f0;            /* what it reflects at normal incidence; 0.04 */
     ssdgs_real kept;          /* 0 .. 1: share of its own light that it keeps beside its lamps', see
                                  ssdgs_settings; 0 */
+    const ssdgs_real (*eyes)[3]; /* (eye_count) of a room: places, world, from which it was photographed: its
+                                    surfaces face them, and all are taken to be lit alike; NULL */
+    int eye_count;               /* up to 32; 0: it was photographed from outside; 0 */
 } unbake_options;
 static inline unbake_options unbake_options_default(void) {
     unbake_options options;
@@ -66,7 +69,8 @@ typedef struct unbake__state {
     int count, batch, told;          /* batch: the first direction at work; told: options.ambient is */
     ssdgs_real low[3], high[3];      /* bounds */
     double size, most;               /* their longest side; the sky that all but few Gaussians see less of */
-    double sky[UNBAKE__SKY][3];      /* directions, even over the sphere */
+    int sky_count;                   /* directions, or eyes */
+    double sky[UNBAKE__SKY][3];      /* directions, even over the sphere; eyes */
     unsigned char used[UNBAKE__SKY]; /* 0: nothing was photographed from there */
     unsigned char *seen;             /* (UNBAKE__SKY, count) how well, 255: fully */
     unbake__splat *splat;            /* (count) */
@@ -126,15 +130,18 @@ static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context
     if (!result) result = ssdgs_scene_create(own, &scene);
     if (!result) unbake__copy(u, model);
     const ssdgs_object object = ssdgs_object_default(model);
-    for (u->batch = 0; u->batch < UNBAKE__SKY && !result; u->batch += UNBAKE__AT_ONCE) {
+    for (u->batch = 0; u->batch < u->sky_count && !result; u->batch += UNBAKE__AT_ONCE) {
         ssdgs_light lights[UNBAKE__AT_ONCE];
-        for (int i = 0; i < UNBAKE__AT_ONCE; i++) {
+        int count = 0;
+        for (; count < UNBAKE__AT_ONCE && u->batch + count < u->sky_count; count++) {
             static const ssdgs_real even[3] = {1, 1, 1};
-            const double *d = u->sky[u->batch + i];
+            const double *d = u->sky[u->batch + count];
             const ssdgs_real along[3] = {(ssdgs_real)-d[0], (ssdgs_real)-d[1], (ssdgs_real)-d[2]};
-            lights[i] = ssdgs_light_directional(along, even);
+            lights[count] = u->options->eye_count
+                                ? ssdgs_light_point(u->options->eyes[u->batch + count], even)
+                                : ssdgs_light_directional(along, even);
         }
-        result = ssdgs_scene_light(scene, &object, 1, lights, UNBAKE__AT_ONCE, &coarse);
+        result = ssdgs_scene_light(scene, &object, 1, lights, count, &coarse);
     }
     ssdgs_scene_destroy(scene);
     ssdgs_model_destroy(model);
@@ -234,18 +241,30 @@ static inline void unbake__stand(unbake__state *u) {
     }
 }
 
+/* The unit vector from a Gaussian to where light number k is. */
+static inline void unbake__toward(const unbake__state *u, const unbake__splat *s, int k, double d[3]) {
+    double length = 1e-30;
+    for (int c = 0; c < 3; c++) {
+        d[c] = u->sky[k][c] - (u->options->eye_count ? (double)s->position[c] : 0);
+        length += d[c] * d[c];
+    }
+    for (int c = 0; c < 3; c++) d[c] /= sqrt(length);
+}
+
 /* A Gaussian's normal and how much of the sky it sees. */
 static inline void unbake__side_task(void *data, int chunk) {
     unbake__state *u = (unbake__state *)data;
     for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
         unbake__splat *s = u->splat + i;
         double sky[3] = {0, 0, 0}, open[3] = {0, 0, 0}, side = 0, n[3], length = 1e-30, share = 0;
-        for (int k = 0; k < UNBAKE__SKY; k++) {
-            const double seen = u->seen[(size_t)k * (size_t)u->count + (size_t)i] / (255.0 * UNBAKE__SKY);
-            for (int c = 0; c < 3; c++) sky[c] += seen * u->sky[k][c];
+        for (int k = 0; k < u->sky_count; k++) {
+            const double seen = u->seen[(size_t)k * (size_t)u->count + (size_t)i] / (255.0 * u->sky_count);
+            double d[3];
+            unbake__toward(u, s, k, d);
+            for (int c = 0; c < 3; c++) sky[c] += seen * d[c];
             if (!u->used[k]) continue;
-            side += seen * unbake__dot(u->sky[k], s->axis);
-            for (int c = 0; c < 3; c++) open[c] += seen * u->sky[k][c];
+            side += seen * unbake__dot(d, s->axis);
+            for (int c = 0; c < 3; c++) open[c] += seen * d[c];
         }
         const double away = sqrt(open[0] * open[0] + open[1] * open[1] + open[2] * open[2]) + 1e-9;
         for (int c = 0; c < 3; c++) {
@@ -257,7 +276,7 @@ static inline void unbake__side_task(void *data, int chunk) {
             s->normal[c] = (float)(n[c] / sqrt(length));
             share += sky[c] * (double)s->normal[c];
         }
-        s->share = (float)share;
+        s->share = (float)(u->options->eye_count ? 1 : share);
     }
 }
 
@@ -418,10 +437,14 @@ static inline ssdgs_result unbake__find(unbake__state *u, ssdgs_context *context
         u->sky[k][1] = across * sin(turn);
         u->sky[k][2] = z;
     }
+    u->sky_count = u->options->eye_count ? u->options->eye_count : UNBAKE__SKY;
+    for (int i = 0; i < 3 * u->options->eye_count; i++)
+        u->sky[i / 3][i % 3] = (double)u->options->eyes[i / 3][i % 3];
     ssdgs_result result = unbake__look(u, context);
     if (!result) result = unbake__read(u);
     if (result) return result;
-    unbake__stand(u);
+    memset(u->used, 1, sizeof u->used);
+    if (!u->options->eye_count) unbake__stand(u);
     result = ssdgs_context_run(context, chunks, unbake__side_task, u);
     u->most = unbake__most(u, 0);
     if (!(u->most > 0)) u->most = 1;
@@ -517,6 +540,9 @@ static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model *pla
     if (!context || !lit || !plain || !ssdgs_model_settings(plain)->baked) return SSDGS_ERR_ARGUMENT;
     memset(&u, 0, sizeof u);
     u.options = options ? options : &none;
+    if (u.options->eye_count < 0 || u.options->eye_count > UNBAKE__SKY ||
+        (u.options->eye_count && !u.options->eyes))
+        return SSDGS_ERR_ARGUMENT;
     for (int i = 0; i < 27; i++) u.told |= u.options->ambient[i / 3][i % 3] != 0;
     u.plain = plain;
     u.count = ssdgs_model_count(plain);

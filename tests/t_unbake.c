@@ -393,8 +393,53 @@ static void test_edges(void) {
     ssdgs_context_destroy(context);
 }
 
+/* A room, seen from two places in it: its walls face them, and are lit alike. */
+static void test_room(void) {
+    enum { WALL = 20, ROOM = 6 * WALL * WALL };
+    static const ssdgs_real eyes[2][3] = {{(ssdgs_real)0.3, (ssdgs_real)-0.2, (ssdgs_real)0.1},
+                                          {(ssdgs_real)-0.5, (ssdgs_real)0.4, (ssdgs_real)-0.3}};
+    ssdgs_context *context = test_context(2);
+    static const int hues[6] = {1, 2, 4, 3, 5, 6};
+    ssdgs_model *model = plain_model(context, ROOM), *lit = NULL;
+    double first = 0;
+    unbake_options options = unbake_options_default();
+    for (int i = 0; i < ROOM; i++) {
+        const int wall = i / (WALL * WALL), axis = wall / 2, side = wall % 2 ? 1 : -1;
+        double at[3], normal[3] = {0, 0, 0}, color[3];
+        at[axis] = side;
+        at[(axis + 1) % 3] = (i % WALL + 0.5) * 2 / WALL - 1;
+        at[(axis + 2) % 3] = (i / WALL % WALL + 0.5) * 2 / WALL - 1;
+        normal[axis] = i % 2 ? 1 : -1; /* of either sign */
+        for (int c = 0; c < 3; c++) color[c] = 0.1 * (wall + 1) * (hues[wall] >> c & 1 ? 1 : 0.3);
+        put(model, i, at, normal, 2.0 / WALL, color);
+    }
+    options.eyes = eyes;
+    options.eye_count = 2;
+    CHECK(!unbake_model(context, model, &options, &lit));
+    for (int i = 0; i < ROOM; i++) {
+        const int wall = i / (WALL * WALL), axis = wall / 2, side = wall % 2 ? 1 : -1;
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(lit, i, &g));
+        CHECK(-side * (double)g.normal[axis] > 0.9);
+        const double scale = (double)g.diffuse[0] / (0.1 * (wall + 1) * (hues[wall] & 1 ? 1 : 0.3));
+        if (!i) first = scale;
+        if (wall < 5) CHECK(fabs(scale / first - 1) < 0.03); /* the brightest is limited */
+    }
+    ssdgs_model_destroy(lit);
+    options.eye_count = 33;
+    CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+    options.eye_count = -1;
+    CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+    options.eye_count = 1;
+    options.eyes = NULL;
+    CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+    ssdgs_model_destroy(model);
+    ssdgs_context_destroy(context);
+}
+
 int main(void) {
     test_same_bits();
+    test_room();
     test_told();
     test_plate();
     test_lit();
