@@ -426,6 +426,25 @@ static void test_room(void) {
         if (wall < 5) CHECK(fabs(scale / first - 1) < 0.03); /* the brightest is limited */
     }
     ssdgs_model_destroy(lit);
+    ssdgs_model_destroy(model);
+    /* two sides of a wall, each seen from one place */
+    static const ssdgs_real beside[2][3] = {{(ssdgs_real)0.7, 0, 0}, {(ssdgs_real)-0.7, 0, 0}};
+    model = plain_model(context, 2 * WALL * WALL);
+    for (int i = 0; i < 2 * WALL * WALL; i++) {
+        const double side = i < WALL * WALL ? 1 : -1, normal[3] = {i % 2 ? 1 : -1, 0, 0},
+                     color[3] = {0.5, 0.5, 0.5};
+        const double at[3] = {0.1 * side, (i % WALL + 0.5) * 2 / WALL - 1,
+                              (i / WALL % WALL + 0.5) * 2 / WALL - 1};
+        put(model, i, at, normal, 2.0 / WALL, color);
+    }
+    options.eyes = beside;
+    CHECK(!unbake_model(context, model, &options, &lit));
+    for (int i = 0; i < 2 * WALL * WALL; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(lit, i, &g));
+        CHECK((i < WALL * WALL ? 1 : -1) * (double)g.normal[0] > 0.9);
+    }
+    ssdgs_model_destroy(lit);
     options.eye_count = 33;
     CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
     options.eye_count = -1;
