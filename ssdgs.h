@@ -2680,6 +2680,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
     for (const ssdgs__number *n = ssdgs__settings; n < ssdgs__settings + SSDGS__SETTING_COUNT; n++) {
         double low = n->low, high = n->high; /* some depend on others */
         if (n->at == offsetof(ssdgs_settings, harmonics) && !ssdgs__keeps(s)) high = 0;
+        if (n->at == offsetof(ssdgs_settings, kept) && s->baked) high = 0;
         if (n->at == offsetof(ssdgs_settings, scattering.width)) low = s->scattering.layers > 1;
         if (n->at == offsetof(ssdgs_settings, shadow.width)) low = s->shadow.layers > 1;
         if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
