@@ -111,13 +111,15 @@ static inline int splats__at(const splats__element *e, const char *name, char ty
     return -1;
 }
 
-/* Reads the header's elements chunk, vertex and sh. Returns what is wrong, or NULL. */
-static inline const char *splats__header(const unsigned char *bytes, size_t size, splats__element e[3]) {
+/* Reads the header's elements chunk, vertex and sh. Returns what is wrong, and in which line, 0: in none; or
+   NULL. */
+static inline const char *splats__header(const unsigned char *bytes, size_t size, splats__element e[3],
+                                         int *number) {
     static const char *const names[3] = {"chunk", "vertex", "sh"};
     const unsigned char *at = bytes, *const end = bytes + size;
     int order[3], elements = 0, little = 0;
     memset(e, 0, 3 * sizeof *e);
-    for (;;) {
+    for (*number = 1;; ++*number) {
         const unsigned char *stop =
             at < end ? (const unsigned char *)memchr(at, '\n', (size_t)(end - at)) : NULL;
         char line[128], word[4][32] = {"", "", "", ""};
@@ -160,6 +162,7 @@ static inline const char *splats__header(const unsigned char *bytes, size_t size
             now->row += type == 'b' ? 1 : 4;
         } else return "its header has a line that says nothing";
     }
+    *number = 0;
     if (!little) return "it is not binary_little_endian";
     for (int i = 0; i < elements; i++) {
         splats__element *now = e + order[i];
@@ -184,35 +187,36 @@ static inline int splats__compressed(const char *name, const unsigned char *byte
                                           "packed_color"};
     static const int low[3] = {21, 11, 0}, wide[3] = {11, 10, 11};
     splats__element e[3], *const chunk = e, *const vertex = e + 1, *const sh = e + 2;
-    int low_at[9], high_at[9], at[4], rest_at[45];
-    const char *problem = splats__header(bytes, size, e);
-    for (int i = 0; i < 9 && !problem; i++) {
-        char text[24];
-        snprintf(text, sizeof text, "min_%s", bounds[i]);
-        low_at[i] = splats__at(chunk, text, 'f');
-        snprintf(text, sizeof text, "max_%s", bounds[i]);
-        high_at[i] = splats__at(chunk, text, 'f');
-        if ((low_at[i] < 0) != (high_at[i] < 0) ||
-            (i < 6 ? low_at[i] < 0 : (low_at[i] < 0) != (low_at[6] < 0)))
-            problem = "a bound of its chunks is missing";
+    int bound_at[18], at[4], rest_at[45], line, colored = 0; /* bound_at: the lower ones, the upper ones */
+    char key[32] = "";                                       /* of what is missing, or the line */
+    const char *problem = splats__header(bytes, size, e, &line);
+    if (problem && line) snprintf(key, sizeof key, "line %d: ", line);
+    for (int i = 0; i < 36 && !problem; i++) { /* twice; colours have all bounds or none */
+        const int k = i % 18;
+        snprintf(key, sizeof key, "%s_%s", k < 9 ? "min" : "max", bounds[k % 9]);
+        bound_at[k] = splats__at(chunk, key, 'f');
+        colored |= k % 9 > 5 && bound_at[k] >= 0;
+        if (i > 17 && bound_at[k] < 0 && (k % 9 < 6 || colored))
+            problem = " is missing among its chunks' floats";
     }
     for (int i = 0; i < 4 && !problem; i++) {
-        at[i] = splats__at(vertex, packed[i], 'u');
-        if (at[i] < 0) problem = "packed numbers of its vertices are missing";
+        snprintf(key, sizeof key, "%s", packed[i]);
+        at[i] = splats__at(vertex, key, 'u');
+        if (at[i] < 0) problem = " is missing among its vertices' uints";
     }
     const int rest = sh->properties;
-    if (!problem && rest != 0 && rest != 9 && rest != 24 && rest != 45)
-        problem = "its harmonics are of no degree from 1 to 3";
-    for (int i = 0; i < rest && !problem; i++) {
-        char text[24];
-        snprintf(text, sizeof text, "f_rest_%d", i);
-        rest_at[i] = splats__at(sh, text, 'b');
-        if (rest_at[i] < 0) problem = "a harmonic is missing";
+    const int degrees = rest == 0 || rest == 9 || rest == 24 || rest == 45;
+    for (int i = 0; i < rest && degrees && !problem; i++) {
+        snprintf(key, sizeof key, "f_rest_%d", i);
+        rest_at[i] = splats__at(sh, key, 'b');
+        if (rest_at[i] < 0) problem = " is missing among its harmonics' uchars";
     }
+    if (!problem) *key = 0;
+    if (!problem && !degrees) problem = "its harmonics are of no degree from 1 to 3";
     if (!problem && rest && sh->count != vertex->count) problem = "not all of its vertices have harmonics";
     if (!problem && chunk->count < (vertex->count + SPLATS__CHUNK - 1) / SPLATS__CHUNK)
         problem = "not all of its vertices have a chunk";
-    if (problem) return olat__fail(error, "%s: a compressed PLY: %s", name, problem);
+    if (problem) return olat__fail(error, "%s: a compressed PLY: %s%s", name, key, problem);
     if (splats__begin(p, name, vertex->count, rest, error)) return 1;
     for (size_t i = 0; i < vertex->count; i++) {
         const unsigned char *of = chunk->rows + i / SPLATS__CHUNK * chunk->row,
@@ -223,9 +227,9 @@ static inline int splats__compressed(const char *name, const unsigned char *byte
         for (int k = 0; k < 9; k++) {
             share[k] = k < 6 ? splats__bits(word[k < 3 ? 0 : 2], low[k % 3], wide[k % 3])
                              : splats__bits(word[3], 24 - 8 * (k - 6), 8);
-            if (low_at[k] >= 0)
-                share[k] = splats__float(of + low_at[k]) * (1 - share[k]) +
-                           splats__float(of + high_at[k]) * share[k];
+            if (bound_at[k] >= 0)
+                share[k] = splats__float(of + bound_at[k]) * (1 - share[k]) +
+                           splats__float(of + bound_at[9 + k]) * share[k];
         }
         for (int k = 0; k < 3; k++) {
             parts[k] = (splats__bits(word[1], 20 - 10 * k, 10) - 0.5) * 1.4142135623730951;

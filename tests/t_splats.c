@@ -37,6 +37,7 @@ static ssdgs_model *unpacked(ssdgs_context *context, const file *f, char error[5
     }
     if (!CHECK(plain && !ssdgs_model_load_memory(context, plain, size, &model, &stats) && stats.plain))
         exit(1);
+    CHECK(!stats.clamped_opacities && !stats.dropped);
     free(plain);
     return model;
 }
@@ -163,18 +164,18 @@ static void test_headers(ssdgs_context *context) {
     static const struct {
         const char *old, *now, *says;
     } wrong[] = {{"binary_little_endian", "binary_big_endian", "is not binary_little_endian"},
-                 {"property float max_y", "property float may_y", "a bound of its chunks"},
-                 {"property float max_g", "property float mag_g", "a bound of its chunks"},
-                 {"property float min_r", "property float mir_r", "a bound of its chunks"},
-                 {"property uint packed_scale", "property float packed_scale", "packed numbers"},
-                 {"property uchar f_rest_7", "property uchar f_rust_7", "a harmonic is missing"},
+                 {"property float max_y", "property float may_y", ": max_y is missing"},
+                 {"property float max_g", "property float mag_g", ": max_g is missing"},
+                 {"property float min_r", "property float mir_r", ": min_r is missing"},
+                 {"property uint packed_scale", "property float packed_scale", ": packed_scale is missing"},
+                 {"property uchar f_rest_7", "property uchar f_rust_7", ": f_rest_7 is missing"},
                  {"property uchar f_rest_8\n", "", "of no degree from 1 to 3"},
                  {"element sh 300", "element sh 299", "not all of its vertices have harmonics"},
                  {"element sh 300", "element sh 301", "ends early"},
                  {"element chunk 2", "element chunk 1", "not all of its vertices have a chunk"},
                  {"element sh 300", "element hs 300", "beside chunk, vertex and sh"},
                  {"element sh 300", "element vertex 300", "stands twice"},
-                 {"element sh 300", "element sh 3e2", "is no number"},
+                 {"element sh 300", "element sh 3e2", ": line 28: a count of rows is no number"},
                  {"element chunk 2", "element chunk -2", "is no number"},
                  {"element vertex 300", "element vertex 268435457", "too large"},
                  {"property uchar f_rest_3", "property short f_rest_3", "neither float, uint nor uchar"},
