@@ -343,7 +343,7 @@ static inline int splats__spz(const char *name, const unsigned char *bytes, size
 enum { SPLATS__PLAIN, SPLATS__GZIP, SPLATS__NEWER, SPLATS__CHUNKS };
 static inline int splats__kind(const unsigned char *bytes, size_t size) {
     static const char mark[] = "packed_position";
-    const size_t most = size < SPLATS__HEAD ? size : SPLATS__HEAD, length = sizeof mark - 1;
+    const size_t most = size < SPLATS__HEAD ? size : (size_t)SPLATS__HEAD, length = sizeof mark - 1;
     if (size > 2 && bytes[0] == 0x1F && bytes[1] == 0x8B) return SPLATS__GZIP;
     if (size > 4 && !memcmp(bytes, "NGSP", 4)) return SPLATS__NEWER;
     for (size_t at = 0; size > 3 && !memcmp(bytes, "ply", 3) && at + length <= most; at++)
@@ -375,6 +375,7 @@ static inline int splats_unpack(const char *name, const unsigned char *bytes, si
     return failed;
 }
 
+#ifndef SSDGS_NO_STDIO
 /* A model of any of the files above. stats may be NULL. 0, or 1 and a message that names the file; then *out
    is NULL. */
 static inline int splats_load(ssdgs_context *context, const char *path, ssdgs_model **out,
@@ -399,4 +400,5 @@ static inline int splats_load(ssdgs_context *context, const char *path, ssdgs_mo
     return result ? olat__fail(error, "%s: %s", ssdgs_result_string(result), ssdgs_error_message(context))
                   : 0;
 }
+#endif
 #endif

@@ -1121,7 +1121,7 @@ static void test_veil(void) {
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_settings settings = ssdgs_settings_default();
     ssdgs_light light = {
-        SSDGS_LIGHT_POINT, {(ssdgs_real)0.01, 0, (ssdgs_real)2.5}, {4, 4, 4}, {0, 0, 0}, {0, 0}, 0, 0, 0};
+        SSDGS_LIGHT_POINT, {(ssdgs_real)0.01, 0, (ssdgs_real)2.5}, {4, 4, 4}, {0, 0, 0}, {0, 0}, 0, 0, 0, 0};
     ssdgs_image out = {0, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
     ssdgs_model *model = NULL;
     out.color = values;

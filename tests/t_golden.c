@@ -425,8 +425,8 @@ static void test_network(const char *name, int shadow, int residual, int default
                    *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
         ssdgs__encode_inputs(context->k, &object.settings, &l, shadow, gauss, part, inputs);
         const ssdgs__network net = {sizes, layers, weights};
-        const ssdgs__colour_in in = {gauss, part, part + l.visibility, shadow ? head : NULL,
-                                     shadow ? NULL : head};
+        const ssdgs__colour_in in = {
+            gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, NULL};
         ssdgs__network_forward(context->k, &net, &lists, inputs, outputs);
         context->k->colour(&k, &in, outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);

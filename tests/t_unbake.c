@@ -431,7 +431,7 @@ static void test_room(void) {
     static const ssdgs_real beside[2][3] = {{(ssdgs_real)0.7, 0, 0}, {(ssdgs_real)-0.7, 0, 0}};
     model = plain_model(context, 2 * WALL * WALL);
     for (int i = 0; i < 2 * WALL * WALL; i++) {
-        const double side = i < WALL * WALL ? 1 : -1, normal[3] = {i % 2 ? 1 : -1, 0, 0},
+        const double side = i < WALL * WALL ? 1 : -1, normal[3] = {i % 2 ? 1.0 : -1.0, 0, 0},
                      color[3] = {0.5, 0.5, 0.5};
         const double at[3] = {0.1 * side, (i % WALL + 0.5) * 2 / WALL - 1,
                               (i / WALL % WALL + 0.5) * 2 / WALL - 1};
