@@ -328,9 +328,10 @@ typedef enum ssdgs_blur { SSDGS_BLUR_ADD = 0, SSDGS_BLUR_FLOOR } ssdgs_blur;
 
 /* What a model computes; stored in its file. 0 or 1 where nothing else is said. */
 typedef struct ssdgs_settings {
-    int version;   /* set by ssdgs_settings_default / _published */
-    int terms;     /* SSDGS_*_TERM mask: what the model has */
-    int baked;     /* 1: each Gaussian has a fixed colour and lights are ignored, as in plain splat files */
+    int version; /* set by ssdgs_settings_default / _published */
+    int terms;   /* SSDGS_*_TERM mask: what the model has */
+    int baked;   /* 1: each Gaussian has a fixed colour, as in plain splat files, which lights change by their
+                    `kept` alone */
     int harmonics; /* degree, 0 .. 3, of the harmonics by which baked and kept colours change with the view */
     ssdgs_real kept; /* 0 .. 1: share of baked colours that a model which is not baked sends besides what its
                         lights make of it, see ssdgs_object. Above 0 its Gaussians have them */
@@ -507,8 +508,8 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
 
 /* Where results go. Set all to 0 first. Planes are the caller's; NULL = not computed. Colours are linear, not
    clamped (settings.transfer none: as stored). diffuse + specular + scattering + (1 - alpha) background =
-   color. Beside an object with deferred highlights, scattering has all light of those without and of baked
-   ones. */
+   color. Beside an object with deferred highlights, scattering has all light of those without, and baked and
+   kept colours but for lights' shares of them, which diffuse has. */
 typedef struct ssdgs_image {
     int stride;                    /* pixels from row to row; 0 = camera width */
     ssdgs_real *color;             /* (h,w,3) */
@@ -6511,12 +6512,13 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         }
         for (int s = 0; limited && s < SSDGS__BLOCK; s++)
             part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)] *= reach[s];
-        for (int s = 0; lighting->kept > 0 && o->kept > 0 && s < SSDGS__BLOCK; s++) {
+        const int takes = lighting->kept > 0 && o->kept > 0;
+        for (int s = 0; takes && s < SSDGS__BLOCK; s++) {
             kept[3 * SSDGS__BLOCK + s] = lighting->kept * (limited ? reach[s] : 1);
             rest[s] -= kept[3 * SSDGS__BLOCK + s];
         }
         const ssdgs__colour_in in = {gauss,  part + l->rows, part + l->visibility,
-                                     shadow, scattering,     lighting->kept > 0 && o->kept > 0 ? kept : NULL};
+                                     shadow, scattering,     takes ? kept : NULL};
         k->colour(lighting, &in, outs);
         if (medium && job->transport)
             ssdgs__medium_rows(lighting, o->medium, gauss, part + l->rows, part + l->transport, outs);

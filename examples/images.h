@@ -1045,7 +1045,7 @@ static void olat__exr_tiles(olat__exr *e) {
     olat__exr_take(e, 1); /* levels: the first is the whole image */
 }
 
-static float olat__exr_float(const unsigned char *p) {
+static float olat__le_float(const unsigned char *p) {
     const uint32_t bits = olat__le32(p);
     float value;
     memcpy(&value, &bits, sizeof value);
@@ -1098,8 +1098,8 @@ static void olat__exr_header(olat__exr *e) {
             if (i == NAME) e->name = text;
             if (i == VIEWS) e->views = text;
             e->has_xy |= i == XY;
-            for (int k = 0; i == XY && k < 8; k++) e->xy[k] = (double)olat__exr_float(p + 4 * k);
-            if (i == ASPECT) e->aspect = olat__exr_float(p);
+            for (int k = 0; i == XY && k < 8; k++) e->xy[k] = (double)olat__le_float(p + 4 * k);
+            if (i == ASPECT) e->aspect = olat__le_float(p);
             if (i == TURNED) e->turned_by = olat__exr_int(e);
         }
         if (e->problem) return;

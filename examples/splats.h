@@ -23,16 +23,6 @@
 enum { SPLATS__CHUNK = 256, SPLATS__MOST = 1 << 28, SPLATS__PROPERTIES = 64, SPLATS__HEAD = 4096 };
 #define SPLATS__HARMONIC 0.28209479177387814 /* a colour is 0.5 + this x f_dc */
 
-static inline uint32_t splats__u32(const unsigned char *at) {
-    return (uint32_t)at[0] | (uint32_t)at[1] << 8 | (uint32_t)at[2] << 16 | (uint32_t)at[3] << 24;
-}
-static inline double splats__float(const unsigned char *at) {
-    const uint32_t bits = splats__u32(at);
-    float value;
-    memcpy(&value, &bits, sizeof value);
-    return (double)value;
-}
-
 /* ---- a plain PLY in memory ---- */
 
 typedef struct splats__ply {
@@ -223,13 +213,13 @@ static inline int splats__compressed(const char *name, const unsigned char *byte
                             *row = vertex->rows + i * vertex->row;
         uint32_t word[4];
         double share[9], parts[3], q[4];
-        for (int k = 0; k < 4; k++) word[k] = splats__u32(row + at[k]);
+        for (int k = 0; k < 4; k++) word[k] = olat__le32(row + at[k]);
         for (int k = 0; k < 9; k++) {
             share[k] = k < 6 ? splats__bits(word[k < 3 ? 0 : 2], low[k % 3], wide[k % 3])
                              : splats__bits(word[3], 24 - 8 * (k - 6), 8);
             if (bound_at[k] >= 0)
-                share[k] = splats__float(of + bound_at[k]) * (1 - share[k]) +
-                           splats__float(of + bound_at[9 + k]) * share[k];
+                share[k] = (double)olat__le_float(of + bound_at[k]) * (1 - share[k]) +
+                           (double)olat__le_float(of + bound_at[9 + k]) * share[k];
         }
         for (int k = 0; k < 3; k++) {
             parts[k] = (splats__bits(word[1], 20 - 10 * k, 10) - 0.5) * 1.4142135623730951;
@@ -263,8 +253,8 @@ static inline const char *splats__gunzip(const unsigned char *in, size_t size, u
             else more = in[at] != 0;
     at += in[3] & 2;
     if (at >= size - 8) return "a bad gzip header";
-    const uint32_t checksum = splats__u32(in + size - 8);
-    *length = splats__u32(in + size - 4);
+    const uint32_t checksum = olat__le32(in + size - 8);
+    *length = olat__le32(in + size - 4);
     if (*length / 1032 > size) return "a length that deflate cannot reach";
     z = (olat__inflater *)calloc(1, sizeof *z);
     *out = (unsigned char *)malloc(*length + 1);
@@ -289,7 +279,7 @@ static inline int splats__spz(const char *name, const unsigned char *bytes, size
     static const double back[3] = {1, -1, -1}; /* y up, z back: y down, z ahead */
     static const signed char flip[15] = {-1, -1, 1, -1, 1, 1, -1, 1, -1, 1, -1, -1, 1, -1, 1};
     if (size < 16 || memcmp(bytes, "NGSP", 4) != 0) return olat__fail(error, "%s: gzip, but no SPZ", name);
-    const uint32_t version = splats__u32(bytes + 4), count = splats__u32(bytes + 8);
+    const uint32_t version = olat__le32(bytes + 4), count = olat__le32(bytes + 8);
     const int degree = bytes[12], fraction = bytes[13], rest = 3 * ((degree + 1) * (degree + 1) - 1);
     if (version < 1 || version > 3)
         return olat__fail(error, "%s: SPZ of version %lu, where 1 to 3 are read", name,
@@ -320,7 +310,7 @@ static inline int splats__spz(const char *name, const unsigned char *bytes, size
             parts[k] = (double)r[k] / 127.5 - 1;
         }
         if (version == 3) { /* a sign and nine bits each, the last lowest */
-            const uint32_t word = splats__u32(r);
+            const uint32_t word = olat__le32(r);
             largest = (int)(word >> 30);
             for (int k = 0; k < 3; k++)
                 parts[k] = (word >> (29 - 10 * k) & 1 ? -1 : 1) * 0.70710678118654752 *

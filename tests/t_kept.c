@@ -121,6 +121,27 @@ static void test_picture(ssdgs_context *context, int harmonics) {
     ssdgs_model_destroy(plain);
 }
 
+/* The parts of an image sum to its colour, with what is kept, a light's share of it too. */
+static void test_parts(ssdgs_context *context, int asg) {
+    static ssdgs_real part[3][PIXELS];
+    ssdgs_model *kept = ball(context, kept_settings(1, asg), COUNT);
+    const ssdgs_object object = ssdgs_object_default(kept);
+    const ssdgs_camera camera = camera_at(2, 1, 0.7);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_light light = lamp(1, 2, 2, 30);
+    ssdgs_scene *scene = NULL;
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = one, image.diffuse = part[0], image.specular = part[1], image.scattering = part[2];
+    light.kept = (ssdgs_real)0.4;
+    CHECK(!ssdgs_scene_create(context, &scene));
+    CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, NULL));
+    for (int i = 0; i < PIXELS; i++) two[i] = part[0][i] + part[1][i] + part[2][i];
+    CHECK_NEAR(one, two, PIXELS, 2e-6, 2e-6, "the parts of an image");
+    ssdgs_scene_destroy(scene);
+    ssdgs_model_destroy(kept);
+}
+
 /* A share of each light is left, everywhere. */
 static const double left[2] = {0.25, 0.5};
 static void shade(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
@@ -398,6 +419,8 @@ static void test_refused(ssdgs_context *context) {
 int main(void) {
     ssdgs_context *context = test_context(2);
     for (int harmonics = 0; harmonics < 4; harmonics++) test_picture(context, harmonics);
+    test_parts(context, SSDGS_ASG_GEOMETRIC);
+    test_parts(context, SSDGS_ASG_DEFERRED);
     for (int i = 0; i < 4; i++) test_shares(context, i & 1, i & 2 ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC);
     for (int baked = 0; baked < 2; baked++) test_floor(context, baked);
     test_files(context, "build/kept.ply");
