@@ -1474,6 +1474,8 @@ typedef struct ssdgs__adam_rate {
         int begin, int end, uint32_t at)) \
     K(void, walk_camera, (const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed)) \
     K(void, walk_light, (const ssdgs__tile *tile, ssdgs_real *sums)) \
+    K(int, map_transmittance, (const ssdgs_splat_view *map, ssdgs_real bias, const ssdgs_real *at, \
+        ssdgs_real *passed, ssdgs_real *slope)) \
     K(void, composite, (const ssdgs__tile *tile, int layers, const ssdgs_real *const *color, \
         ssdgs_real *pixels)) \
     T(void, composite_backward, (const ssdgs__tile *tile, int layers, const ssdgs_real *const *color, \
@@ -1576,31 +1578,6 @@ static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *ti
 }
 
 /* ---- a light's map of where transmittance falls ---- */
-
-/* Notes where these pixels of a micro-tile fell below levels of transmittance. after: (., 16) transmittances,
-   row 0 before any entry, row index + 1 after that entry. */
-static void ssdgs__light_map_note(const ssdgs__tile *tile, int micro, unsigned pixels, uint64_t entries,
-                                  ssdgs_real (*after)[16], const ssdgs_real *distance, ssdgs_real *next,
-                                  unsigned char *level) {
-    for (; pixels; pixels &= pixels - 1) {
-        const int lane = ssdgs__lowest_bit(pixels);
-        ssdgs_light_pixel *at = tile->light_map + 16 * micro + lane;
-        ssdgs_real before = after[0][lane];
-        int l = level[lane];
-        for (uint64_t left = entries; left && l < SSDGS__MAP_STEPS; left &= left - 1) {
-            const int index = ssdgs__lowest_bit(left);
-            const ssdgs_real t = after[index + 1][lane];
-            for (; l < SSDGS__MAP_STEPS && t < ssdgs__map_level[l]; l++) {
-                at->distance[l] = distance[index];
-                if (l < SSDGS__MAP_STEPS - 1) at->left[l] = t;
-                if (l) at->before[l - 1] = before;
-            }
-            before = t;
-        }
-        level[lane] = (unsigned char)l;
-        next[lane] = l < SSDGS__MAP_STEPS ? ssdgs__map_level[l] : -1;
-    }
-}
 
 /* Closes the list of each pixel, of `levels` so far. */
 static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *levels,
@@ -6982,99 +6959,44 @@ typedef struct ssdgs__composite_job {
     ssdgs_real *planes[4]; /* colour, transmittance */
 } ssdgs__composite_job;
 
-/* Transmittance at a distance from the light, by one pixel of its map. After a fall it stays at what that
-   left, until `thick` ahead of the next fall, then goes linearly to what there was before that one. steep:
-   its derivative by the distance. */
-static SSDGS__INLINE ssdgs_real ssdgs__pixel_transmittance(const ssdgs_splat_view *map, int x, int y,
-                                                           ssdgs_real distance, ssdgs_real thick,
-                                                           ssdgs_real *steep) {
-    const uint32_t tile = map->map_tile[(y >> 4) * map->tiles_x + (x >> 4)];
-    *steep = 0;
-    if (tile == UINT32_MAX) return 1;
-    const ssdgs_light_pixel *at =
-        map->light_map + (size_t)tile * 256 + ((y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3));
-    int level = 0;
-    for (int i = 0; i < SSDGS__MAP_STEPS; i++) level += distance > at->distance[i];
-    if (!level) return 1;
-    if (level == SSDGS__MAP_STEPS) return at->behind;
-    const ssdgs_real left = at->left[level - 1];
-    const ssdgs_real begin = at->distance[level] - thick > at->distance[level - 1]
-                                 ? at->distance[level] - thick
-                                 : at->distance[level - 1];
-    if (distance <= begin) return left;
-    *steep = (at->before[level - 1] - left) / (at->distance[level] - begin);
-    return left + (at->before[level - 1] - left) * (distance - begin) / (at->distance[level] - begin);
-}
-
-/* Transmittance to a place in the world, between four pixels of a map; -1 outside of it. slope: its gradient
-   by the place, or NULL. */
-static ssdgs_real ssdgs__map_transmittance(const ssdgs_splat_view *map, const ssdgs_real at[3],
-                                           ssdgs_real bias, ssdgs_real *slope) {
-    const ssdgs_real wide = (ssdgs_real)(map->width - 1), high = (ssdgs_real)(map->height - 1),
-                     half = (ssdgs_real)0.5;
-    ssdgs_real t[3];
-    for (int i = 0; i < 3; i++)
-        t[i] = map->view[4 * i] * at[0] + map->view[4 * i + 1] * at[1] + map->view[4 * i + 2] * at[2] +
-               map->view[4 * i + 3];
-    if (!(t[2] > map->near_plane)) return -1;
-    const ssdgs_real inverse_z = map->orthographic ? 1 : 1 / t[2];
-    ssdgs_real u = map->fx * t[0] * inverse_z + map->cx - half;
-    ssdgs_real w = map->fy * t[1] * inverse_z + map->cy - half;
-    if (!(u >= -half && w >= -half && u <= wide + half && w <= high + half)) return -1;
-    const int inside[2] = {0 < u && u < wide, 0 < w && w < high};
-    u = u < 0 ? 0 : u > wide ? wide : u;
-    w = w < 0 ? 0 : w > high ? high : w;
-    const ssdgs_real far_off = map->by_distance ? SSDGS__SQRT(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]) : t[2];
-    const ssdgs_real distance = far_off - (bias + (ssdgs_real)1e-6 * far_off + map->nearest);
-    const int x = u < wide ? (int)u : map->width - 2;
-    const int y = w < high ? (int)w : map->height - 2;
-    u -= (ssdgs_real)x;
-    w -= (ssdgs_real)y;
-    ssdgs_real row[2], by_u[2], by_distance[2];
-    for (int i = 0; i < 2; i++) {
-        ssdgs_real steep[2];
-        const ssdgs_real left = ssdgs__pixel_transmittance(map, x, y + i, distance, bias, steep),
-                         right = ssdgs__pixel_transmittance(map, x + 1, y + i, distance, bias, steep + 1);
-        row[i] = (1 - u) * left + u * right;
-        by_u[i] = right - left;
-        by_distance[i] = (1 - u) * steep[0] + u * steep[1];
-    }
-    if (slope) {
-        const ssdgs_real du = inside[0] ? ((1 - w) * by_u[0] + w * by_u[1]) * map->fx * inverse_z : 0,
-                         dw = inside[1] ? (row[1] - row[0]) * map->fy * inverse_z : 0,
-                         dd = ((1 - w) * by_distance[0] + w * by_distance[1]) * (1 - (ssdgs_real)1e-6);
-        ssdgs_real dt[3] = {du, dw, map->orthographic ? 0 : -(du * t[0] + dw * t[1]) * inverse_z};
-        for (int i = 0; i < 3; i++) dt[i] += map->by_distance ? dd * t[i] / far_off : i == 2 ? dd : 0;
-        for (int c = 0; c < 3; c++)
-            slope[c] = map->view[c] * dt[0] + map->view[4 + c] * dt[1] + map->view[8 + c] * dt[2];
-    }
-    return (1 - w) * row[0] + w * row[1];
-}
-
-/* Transmittance from a light to a place in the world, by its maps; -1 where none knows it. slope as above. */
-static ssdgs_real ssdgs__light_transmittance(const ssdgs_frame *frame, int light, const ssdgs_real at[3],
-                                             ssdgs_real *slope) {
-    ssdgs_real passed = -1;
-    const ssdgs__light_memory *own = ssdgs__light_memories(frame) + light;
-    for (int view = own->first; view < own->first + own->views && passed < 0; view++)
-        if (frame->views[view].light_map)
-            passed = ssdgs__map_transmittance(frame->views + view, at, frame->bias[1], slope);
-    return passed;
+/* Transmittance from a light to sixteen places in the world, rows of x, y and z, by the maps of its views in
+   turn, where passed is -1, as it stays where none knows the place. slope: rows of its gradient by the place,
+   or NULL. */
+static void ssdgs__light_transmittance(const ssdgs__kernels *k, const ssdgs_splat_view *view,
+                                       const ssdgs_splat_view *end, ssdgs_real bias, const ssdgs_real *at,
+                                       ssdgs_real *passed, ssdgs_real *slope) {
+    while (view < end && (!view->light_map || k->map_transmittance(view, bias, at, passed, slope))) view++;
 }
 
 /* Where a tile keeps pixel i of 256: [micro-tile][4][16 lanes]. */
 static int ssdgs__tile_lane(int i) { return i / 16 * 64 + i % 16; }
 
-/* The camera's ray (x, y, 1) of a tile's pixel i, [micro-tile][16 lanes], and where in the world it is at
-   depth z. */
-static void ssdgs__place_of_pixel(const ssdgs__lighting *k, const ssdgs__tile *tile, int i, ssdgs_real z,
-                                  ssdgs_real ray[2], ssdgs_real at[3]) {
-    const ssdgs_real x = (ssdgs_real)(tile->x + 4 * (i / 16 & 3) + (i & 3)),
-                     y = (ssdgs_real)(tile->y + 4 * (i / 64) + (i % 16 >> 2));
-    ray[0] = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
-    ray[1] = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
-    for (int c = 0; c < 3; c++)
-        at[c] = k->eye[c] + z * (k->view[c] * ray[0] + k->view[4 + c] * ray[1] + k->view[8 + c]);
+/* Where a micro-tile's pixels are in the world, rows of x, y and z, by their depth layer, and their cameras'
+   rays (x, y, 1), rows of x and y. asked: whose places count; the others stand at the eye. */
+static void ssdgs__places(const ssdgs__lighting *k, const ssdgs__tile *tile, int micro,
+                          const ssdgs_real *depth, const unsigned char *asked, ssdgs_real *ray,
+                          ssdgs_real *at) {
+    for (int i = 0; i < 16; i++) {
+        const ssdgs_real x = (ssdgs_real)(tile->x + 4 * (micro & 3) + (i & 3)),
+                         y = (ssdgs_real)(tile->y + 4 * (micro >> 2) + (i >> 2)),
+                         z = asked[i] ? depth[i] / depth[i + 32] : 0;
+        ray[i] = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
+        ray[i + 16] = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
+        for (int c = 0; c < 3; c++)
+            at[i + 16 * c] =
+                k->eye[c] + z * (k->view[c] * ray[i] + k->view[4 + c] * ray[i + 16] + k->view[8 + c]);
+    }
+}
+
+/* Transmittance from a light to the places of a micro-tile's pixels, -1 where no map knows them; 1 where they
+   are not asked for. */
+static void ssdgs__places_transmittance(const ssdgs_frame *frame, int light, const unsigned char *asked,
+                                        const ssdgs_real *at, ssdgs_real *passed, ssdgs_real *slope) {
+    const ssdgs__light_memory *own = ssdgs__light_memories(frame) + light;
+    const ssdgs_splat_view *first = frame->views + own->first;
+    for (int i = 0; i < 16; i++) passed[i] = asked[i] ? -1 : 1;
+    ssdgs__light_transmittance(frame->context->k, first, first + own->views, frame->bias[1], at, passed,
+                               slope);
 }
 
 /* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at
@@ -7084,20 +7006,23 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
-    for (int i = 0; i < 256; i++) {
-        const int lane = ssdgs__tile_lane(i);
-        const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
-        ssdgs_real ray[2], at[3];
-        visibility[lane] = 1;
-        if (!k->shadow || !(depth[32] > SSDGS__THIN)) continue;
-        ssdgs__place_of_pixel(k, tile, i, depth[0] / depth[32], ray, at);
-        const ssdgs_real passed = ssdgs__light_transmittance(frame, light, at, NULL);
-        visibility[lane] =
-            passed < 0 ? layers[SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + lane + 16] / depth[32] : passed;
-        if (!frame->occluder || passed < 0) continue; /* the Gaussians' has it already */
-        memcpy(points + 3 * points_count, at, sizeof at);
-        fraction[points_count] = 1;
-        lanes[points_count++] = lane;
+    for (int micro = 0; micro < 16; micro++) {
+        const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 64 * micro,
+                         *own = layers + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + 64 * micro + 16;
+        ssdgs_real ray[32], at[48], *passed = visibility + 64 * micro;
+        unsigned char asked[16];
+        int any = 0;
+        for (int i = 0; i < 16; i++) any += asked[i] = k->shadow && depth[i + 32] > SSDGS__THIN;
+        if (any) ssdgs__places(k, tile, micro, depth, asked, ray, at);
+        ssdgs__places_transmittance(frame, light, asked, at, passed, NULL);
+        for (int i = 0; i < 16 && any; i++) {
+            const int known = passed[i] >= 0; /* the Gaussians' has what the occluder says already */
+            if (!known) passed[i] = own[i] / depth[i + 32];
+            if (!frame->occluder || !asked[i] || !known) continue;
+            for (int c = 0; c < 3; c++) points[3 * points_count + c] = at[i + 16 * c];
+            fraction[points_count] = 1;
+            lanes[points_count++] = 64 * micro + i;
+        }
     }
     if (!points_count) return;
     frame->occluder->shadow(frame->occluder->user, light, points, points_count, fraction);
@@ -7274,30 +7199,38 @@ static void ssdgs__gradient_product(const ssdgs_real *pixels, ssdgs_real *gradie
 static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lighting *k, int light,
                                   const ssdgs__tile *tile, const ssdgs_real *pixels, ssdgs_real *gradient,
                                   ssdgs_real *sums) {
-    const ssdgs_real *dv = gradient + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + SSDGS__TILE_FOURTH;
-    for (int i = 0; i < 256; i++) {
-        const int lane = ssdgs__tile_lane(i), layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + lane;
-        const ssdgs_real cover = pixels[layer + 32];
-        ssdgs_real ray[2], at[3], slope[3], along = 0;
-        if (!(dv[lane] < 0 || dv[lane] > 0) || !(cover > SSDGS__THIN)) continue;
-        const ssdgs_real z = pixels[layer] / cover;
-        ssdgs__place_of_pixel(k, tile, i, z, ray, at);
-        if (ssdgs__light_transmittance(frame, light, at, slope) < 0) { /* it is the Gaussians' */
-            const int own = SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + lane + 16;
-            gradient[own] += dv[lane] / cover;
-            gradient[layer + 32] -= dv[lane] * pixels[own] / (cover * cover);
-            continue;
+    for (int micro = 0; micro < 16; micro++) {
+        const int layer = SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 64 * micro,
+                  own = SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + 64 * micro + 16;
+        const ssdgs_real *depth = pixels + layer, *dv = gradient + own - 16 + SSDGS__TILE_FOURTH;
+        ssdgs_real ray[32], at[48], slope[48], passed[16], *ddepth = gradient + layer;
+        unsigned char asked[16];
+        int any = 0;
+        for (int i = 0; i < 16; i++)
+            any += asked[i] = (dv[i] < 0 || dv[i] > 0) && depth[i + 32] > SSDGS__THIN;
+        if (!any) continue;
+        ssdgs__places(k, tile, micro, depth, asked, ray, at);
+        ssdgs__places_transmittance(frame, light, asked, at, passed, slope);
+        for (int i = 0; i < 16; i++) {
+            const ssdgs_real cover = depth[i + 32], z = depth[i] / cover;
+            ssdgs_real along = 0;
+            if (!asked[i]) continue;
+            if (passed[i] < 0) { /* it is the Gaussians' */
+                gradient[own + i] += dv[i] / cover;
+                ddepth[i + 32] -= dv[i] * pixels[own + i] / (cover * cover);
+                continue;
+            }
+            for (int c = 0; c < 3; c++) { /* at = eye + z (x, y, 1) R */
+                const ssdgs_real d = dv[i] * slope[i + 16 * c];
+                along += d * (k->view[c] * ray[i] + k->view[4 + c] * ray[i + 16] + k->view[8 + c]);
+                sums[3 + c] += d;
+                sums[6 + c] += d * z * ray[i];
+                sums[9 + c] += d * z * ray[i + 16];
+                sums[12 + c] += d * z;
+            }
+            ddepth[i] += along / cover;
+            ddepth[i + 32] -= along * z / cover;
         }
-        for (int c = 0; c < 3; c++) { /* at = eye + z (x, y, 1) R */
-            const ssdgs_real d = dv[lane] * slope[c];
-            along += d * (k->view[c] * ray[0] + k->view[4 + c] * ray[1] + k->view[8 + c]);
-            sums[3 + c] += d;
-            sums[6 + c] += d * z * ray[0];
-            sums[9 + c] += d * z * ray[1];
-            sums[12 + c] += d * z;
-        }
-        gradient[layer] += along / cover;
-        gradient[layer + 32] -= along * z / cover;
     }
 }
 
@@ -7827,6 +7760,7 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
 }
 
 typedef struct ssdgs__shadow_job {
+    const ssdgs__kernels *k;
     const ssdgs_splat_view *view, *end; /* the light's */
     const ssdgs_real *points;
     ssdgs_real *fraction, bias;
@@ -7835,11 +7769,18 @@ typedef struct ssdgs__shadow_job {
 
 static void ssdgs__shadow_task(void *data, int chunk) {
     const ssdgs__shadow_job *job = (const ssdgs__shadow_job *)data;
-    for (int i = chunk * SSDGS__CHUNK; i < job->count && i / SSDGS__CHUNK == chunk; i++) {
-        ssdgs_real passed = -1;
-        for (const ssdgs_splat_view *v = job->view; v < job->end && passed < 0; v++)
-            passed = ssdgs__map_transmittance(v, job->points + 3 * (size_t)i, job->bias, NULL);
-        job->fraction[i] = passed < 0 ? 1 : passed; /* beside all objects */
+    const int end = job->count / SSDGS__CHUNK > chunk ? (chunk + 1) * SSDGS__CHUNK : job->count;
+    for (int first = chunk * SSDGS__CHUNK; first < end; first += 16) {
+        const int count = end - first < 16 ? end - first : 16;
+        ssdgs_real at[48], passed[16];
+        for (int i = 0; i < 16; i++) { /* the last of them fills up */
+            const ssdgs_real *from = job->points + 3 * (size_t)(first + (i < count ? i : count - 1));
+            for (int c = 0; c < 3; c++) at[i + 16 * c] = from[c];
+            passed[i] = -1;
+        }
+        ssdgs__light_transmittance(job->k, job->view, job->end, job->bias, at, passed, NULL);
+        for (int i = 0; i < count; i++)
+            job->fraction[first + i] = passed[i] < 0 ? 1 : passed[i]; /* 1: beside all objects */
     }
 }
 
@@ -7853,6 +7794,7 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
     SSDGS__REFUSE(!m || light < 0 || light >= m->mapped,
                   "light %d: ssdgs_scene_light() has made no map of it", light);
     const ssdgs__light_memory *own = (const ssdgs__light_memory *)m->lights.memory + light;
+    job.k = context->k;
     job.view = (const ssdgs_splat_view *)m->views.memory + own->first;
     job.end = job.view + (own->wanted ? own->views : 0);
     job.points = points;
@@ -12298,7 +12240,23 @@ SSDGS__FI void F(transpose4)(const R *in, size_t in_stride, R *out, size_t out_s
 #endif
 }
 
+/* SSDGS__VW rows of eight values become eight columns. */
+SSDGS__FI void F(columns8)(const R *rows, R (*column)[SSDGS__VW]) {
+#if SSDGS__VW == 1
+    memcpy(column, rows, 8 * sizeof *rows);
+#else
+    for (int i = 0; i < SSDGS__VW; i += 4)
+        for (int j = 0; j < 8; j += 4) F(transpose4)(rows + 8 * i + j, 8, column[j] + i, SSDGS__VW);
+#endif
+}
+
 /* ==== >>vmath  elementary functions on V, the transfer curve ==== */
+
+/* The greatest whole number up to x >= 0. */
+SSDGS__FI V F(floor)(V x) {
+    const V whole = V_ROUND(x);
+    return V_SEL(V_LT(x, whole), V_SUB(whole, V_SET(1)), whole);
+}
 
 /* The kernels call them; the host calls their scalar forms. */
 
@@ -12993,6 +12951,38 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
     }
 }
 
+/* Which of a micro-tile's transmittances are below the level that each pixel waits for, as bits. */
+SSDGS__FI unsigned F(below)(const R *transmittance, const R *next) {
+    unsigned bits = 0;
+    V_UNROLL for (int v = 0; v < SSDGS__NV; v++) bits |=
+        (unsigned)V_BITS(V_LT(V_LOAD(transmittance + v * SSDGS__VW), V_LOAD(next + v * SSDGS__VW)))
+        << v * SSDGS__VW;
+    return bits;
+}
+
+/* Notes in the light's map where pixels of a micro-tile fall below levels. after: transmittances, row 0
+   before any entry, row index + 1 after that entry. */
+SSDGS__FI void F(light_map_note)(const ssdgs__tile *tile, int micro, uint64_t entries, R (*after)[16],
+                                 const R *distance, R *next, unsigned char *level) {
+    for (int before = 0; entries; entries &= entries - 1) {
+        const int index = ssdgs__lowest_bit(entries);
+        for (unsigned fell = F(below)(after[index + 1], next); fell; fell &= fell - 1) {
+            const int lane = ssdgs__lowest_bit(fell);
+            const R t = after[index + 1][lane];
+            ssdgs_light_pixel *at = tile->light_map + 16 * micro + lane;
+            int l = level[lane];
+            for (; l < SSDGS__MAP_STEPS && t < ssdgs__map_level[l]; l++) {
+                at->distance[l] = distance[index];
+                if (l < SSDGS__MAP_STEPS - 1) at->left[l] = t;
+                if (l) at->before[l - 1] = after[before][lane];
+            }
+            level[lane] = (unsigned char)l;
+            next[lane] = l < SSDGS__MAP_STEPS ? ssdgs__map_level[l] : -1;
+        }
+        before = index + 1;
+    }
+}
+
 /* Light walk, eqs. 6, 7, the depth cue and the flux if asked for: per entry, sums (n, 4) of rho v, rho, rho
    x cue, solid angle x blend weight. An entry is sampled once everything nearer than its distance - bias is
    in the transmittance, and takes part in it once its own distance is reached. So two cursors run along the
@@ -13094,12 +13084,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                     }
                 }
             }
-            unsigned fell = 0;
-            for (int v = 0; v < SSDGS__NV; v++)
-                fell |= (unsigned)V_BITS(V_LT(t[v], V_LOAD(next[micro] + v * SSDGS__VW))) << v * SSDGS__VW;
-            if (fell)
-                ssdgs__light_map_note(tile, micro, fell, entries, history[0], applied.distance, next[micro],
-                                      steps[micro]);
+            if (F(below)(history[0][ssdgs__highest_bit(entries << 1)], next[micro])) F(light_map_note)
+            (tile, micro, entries, history[0], applied.distance, next[micro], steps[micro]);
             for (uint64_t left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left),
                           then = ssdgs__highest_bit((entries & nearer[index]) << 1);
@@ -13134,6 +13120,105 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
         for (int i = 0; flux && i < applies; i++) sums[(size_t)applied.place[i] * 4 + 3] += F(sum)(energy[i]);
     }
     if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
+}
+
+/* Transmittance at distances from the light, by pixels of its map, columns of ssdgs_light_pixel. After a fall
+   it stays at what that left, until `thick` ahead of the next fall, then goes linearly to what there was
+   before that one. steep: its derivative by the distance, or NULL. */
+SSDGS__FI V F(pixel_transmittance)(R (*pixel)[SSDGS__VW], V distance, V thick, V *steep) {
+    const V zero = V_SET(0), first = V_LOAD(pixel[0]), second = V_LOAD(pixel[1]), third = V_LOAD(pixel[2]);
+    const VM past = V_LT(second, distance); /* the second fall */
+    const V left = V_SEL(past, V_LOAD(pixel[4]), V_LOAD(pixel[3]));
+    const V rise = V_SUB(V_SEL(past, V_LOAD(pixel[6]), V_LOAD(pixel[5])), left);
+    const V last = V_SEL(past, second, first), next = V_SEL(past, third, second);
+    const V begin = V_MAX(V_SUB(next, thick), last), length = V_SUB(next, begin);
+    const VM none = V_GE(first, distance), all = V_LT(third, distance), rises = V_LT(begin, distance);
+    const V between = V_ADD(left, V_DIV(V_MUL(rise, V_SUB(distance, begin)), length));
+    if (steep) *steep = V_SEL(none, zero, V_SEL(all, zero, V_SEL(rises, V_DIV(rise, length), zero)));
+    return V_SEL(none, V_SET(1), V_SEL(all, V_LOAD(pixel[7]), V_SEL(rises, between, left)));
+}
+
+/* Transmittance from a light to sixteen places in the world, rows of x, y and z, between four pixels of a
+   map: passed, where it is -1 and the map has the place. Returns whether any is left at -1. slope: rows of
+   its gradient by the place, or NULL. */
+SSDGS__FN int F(map_transmittance)(const ssdgs_splat_view *map, R bias, const R *at, R *passed, R *slope) {
+    static const ssdgs_light_pixel open = {{SSDGS__NEVER, SSDGS__NEVER, SSDGS__NEVER}, {1, 1}, {1, 1}, 1};
+    const V zero = V_SET(0), one = V_SET(1), half = V_SET(0.5), tiny = V_SET(1e-6), thick = V_SET(bias);
+    const V wide = V_SET(map->width - 1), high = V_SET(map->height - 1);
+    const R *m = map->view;
+    int unknown = 0;
+    for (int lane = 0; lane < 16; lane += SSDGS__VW) {
+        const V before = V_LOAD(passed + lane);
+        V t[3];
+        for (int i = 0; i < 3; i++) {
+            const V x = V_MUL(V_SET(m[4 * i]), V_LOAD(at + lane));
+            const V y = V_MUL(V_SET(m[4 * i + 1]), V_LOAD(at + 16 + lane));
+            const V z = V_MUL(V_SET(m[4 * i + 2]), V_LOAD(at + 32 + lane));
+            t[i] = V_ADD(V_ADD(V_ADD(x, y), z), V_SET(m[4 * i + 3]));
+        }
+        const V inverse_z = map->orthographic ? one : V_DIV(one, t[2]);
+        V u = V_SUB(V_ADD(V_MUL(V_MUL(V_SET(map->fx), t[0]), inverse_z), V_SET(map->cx)), half);
+        V w = V_SUB(V_ADD(V_MUL(V_MUL(V_SET(map->fy), t[1]), inverse_z), V_SET(map->cy)), half);
+        const VM inside = V_AND(V_AND(V_AND(V_GE(u, V_NEG(half)), V_GE(V_ADD(wide, half), u)),
+                                      V_AND(V_GE(w, V_NEG(half)), V_GE(V_ADD(high, half), w))),
+                                V_AND(V_LT(V_SET(map->near_plane), t[2]), V_LT(before, zero)));
+        const V xx_yy = V_ADD(V_MUL(t[0], t[0]), V_MUL(t[1], t[1]));
+        const V far_off = map->by_distance ? V_SQRT(V_ADD(xx_yy, V_MUL(t[2], t[2]))) : t[2];
+        const V nearest = V_ADD(V_ADD(thick, V_MUL(tiny, far_off)), V_SET(map->nearest));
+        if (!V_BITS(inside)) {
+            unknown |= V_BITS(V_LT(before, zero));
+            continue;
+        }
+        u = V_MIN(V_MAX(u, zero), wide);
+        w = V_MIN(V_MAX(w, zero), high);
+        const VM moves_u = V_AND(V_LT(zero, u), V_LT(u, wide)), moves_w = V_AND(V_LT(zero, w), V_LT(w, high));
+        const V left = V_MIN(F(floor)(u), V_SUB(wide, one)), top = V_MIN(F(floor)(w), V_SUB(high, one));
+        R corner_x[SSDGS__VW], corner_y[SSDGS__VW];
+        V_STORE(corner_x, left);
+        V_STORE(corner_y, top);
+        u = V_SUB(u, left);
+        w = V_SUB(w, top);
+        V found[4], steep[4];
+        for (int corner = 0; corner < 4; corner++) {
+            ssdgs_light_pixel pixel[SSDGS__VW];
+            R column[8][SSDGS__VW];
+            for (int i = 0; i < SSDGS__VW; i++) {
+                const int x = (int)corner_x[i] + (corner & 1), y = (int)corner_y[i] + (corner >> 1);
+                const uint32_t tile = map->map_tile[(y >> 4) * map->tiles_x + (x >> 4)];
+                const int of_tile = (y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3);
+                pixel[i] = tile == UINT32_MAX ? open : map->light_map[(size_t)tile * 256 + (size_t)of_tile];
+            }
+            F(columns8)((const R *)(const void *)pixel, column);
+            found[corner] =
+                F(pixel_transmittance)(column, V_SUB(far_off, nearest), thick, slope ? steep + corner : NULL);
+        }
+        const V not_u = V_SUB(one, u), not_w = V_SUB(one, w);
+        const V upper = V_ADD(V_MUL(not_u, found[0]), V_MUL(u, found[1]));
+        const V lower = V_ADD(V_MUL(not_u, found[2]), V_MUL(u, found[3]));
+        const V all = V_SEL(inside, V_ADD(V_MUL(not_w, upper), V_MUL(w, lower)), before);
+        V_STORE(passed + lane, all);
+        unknown |= V_BITS(V_LT(all, zero));
+        if (!slope) continue;
+        V du = V_ADD(V_MUL(not_w, V_SUB(found[1], found[0])), V_MUL(w, V_SUB(found[3], found[2])));
+        V dw = V_SUB(lower, upper);
+        du = V_SEL(moves_u, V_MUL(V_MUL(du, V_SET(map->fx)), inverse_z), zero);
+        dw = V_SEL(moves_w, V_MUL(V_MUL(dw, V_SET(map->fy)), inverse_z), zero);
+        const V upper_steep = V_ADD(V_MUL(not_u, steep[0]), V_MUL(u, steep[1]));
+        const V lower_steep = V_ADD(V_MUL(not_u, steep[2]), V_MUL(u, steep[3]));
+        const V steepness = V_MUL(V_ADD(V_MUL(not_w, upper_steep), V_MUL(w, lower_steep)), V_SUB(one, tiny));
+        V dt[3] = {du, dw, zero};
+        if (!map->orthographic) dt[2] = V_MUL(V_NEG(V_ADD(V_MUL(du, t[0]), V_MUL(dw, t[1]))), inverse_z);
+        for (int i = 0; i < 3; i++)
+            dt[i] = V_ADD(dt[i], map->by_distance ? V_DIV(V_MUL(steepness, t[i]), far_off)
+                                 : i == 2         ? steepness
+                                                  : zero);
+        for (int i = 0; i < 3; i++) {
+            const V x = V_MUL(V_SET(m[i]), dt[0]), y = V_MUL(V_SET(m[4 + i]), dt[1]);
+            const V along = V_ADD(V_ADD(x, y), V_MUL(V_SET(m[8 + i]), dt[2]));
+            V_STORE(slope + 16 * i + lane, V_SEL(inside, along, V_LOAD(slope + 16 * i + lane)));
+        }
+    }
+    return unknown;
 }
 
 /* ==== >>composite_kernel  eq. 1: layers of color (n, 4) of Gaussians -> the tile's pixels ==== */

@@ -750,9 +750,15 @@ static double stray_loss(ssdgs_model *model, ssdgs_frame *frame, int *without) {
     frame->normal_gradient = NULL;
     for (int i = 0; without && i < pixels; i++) {
         const double alpha = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 2)[i],
-                     z = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0)[i] / alpha,
-                     at[3] = {(i % STRAY_SIDE + 0.5 - 12) / 60 * z, (i / STRAY_SIDE + 0.5 - 12) / 60 * z, z};
-        *without += alpha > 1e-3 && ssdgs__light_transmittance(frame, 0, at, NULL) < 0;
+                     z = ssdgs__layer_plane(frame, SSDGS__DEPTH_LAYER, 0)[i] / alpha;
+        double at[48] = {0}, passed[16]; /* of sixteen places the first counts */
+        at[0] = (i % STRAY_SIDE + 0.5 - 12) / 60 * z;
+        at[16] = (i / STRAY_SIDE + 0.5 - 12) / 60 * z;
+        at[32] = z;
+        for (int j = 0; j < 16; j++) passed[j] = j ? 1 : -1;
+        ssdgs__light_transmittance(frame->context->k, frame->views + 1, frame->views + frame->view_count,
+                                   frame->bias[1], at, passed, NULL);
+        *without += alpha > 1e-3 && passed[0] < 0;
     }
     return sum;
 }
