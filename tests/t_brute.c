@@ -1605,26 +1605,42 @@ static void test_normals(void) {
     if (!CHECK(most < (DOUBLE ? 1e-12 : 5e-5))) printf("    normals of a depth image: off by %.3g\n", most);
 }
 
-/* A fall in a later batch of a walk knows what the batches before it left. */
-static void test_map_batches(void) {
+/* A fall in a later batch of a walk knows what the batches before it left. 66 entries: the first and the last
+   two lie in another micro-tile than those between, which fill the first batch. */
+static void test_map_batches(const ssdgs__kernels *k) {
+    enum { ENTRIES = 66, SPLIT = ENTRIES - 2 };
+    ssdgs_record record[ENTRIES];
+    ssdgs_tile_entry list[ENTRIES];
+    ssdgs_real depth[ENTRIES], sums[4 * ENTRIES];
     static ssdgs_light_pixel map[256];
-    ssdgs_real after[3][16], next[16];
-    const ssdgs_real distance[2] = {2, 3};
-    unsigned char level[16];
     ssdgs__tile tile;
     memset(&tile, 0, sizeof tile);
-    memset(level, 0, sizeof level);
-    tile.light_map = map;
-    for (int lane = 0; lane < 16; lane++) {
-        after[0][lane] = (ssdgs_real)0.95;
-        after[1][lane] = (ssdgs_real)0.4;
-        after[2][lane] = (ssdgs_real)0.3;
+    memset(record, 0, sizeof record);
+    for (int i = 0; i < ENTRIES; i++) {
+        const double alpha = !i ? 0.05 : i == SPLIT ? 0.58 : i > SPLIT ? 0.8 : 0.01;
+        record[i].log2_opacity = (ssdgs_real)(log(alpha) / log(2.0));
+        list[i].gaussian = (uint32_t)i;
+        list[i].mask = (uint16_t)(!i || i >= SPLIT ? 2 : 1);
+        depth[i] = (ssdgs_real)(2 + i);
     }
-    ssdgs__light_map_note(&tile, 1, 1u << 5, 3, after, distance, next, level);
-    const ssdgs_light_pixel *at = map + 16 + 5;
-    CHECK(level[5] == 2 && next[5] == ssdgs__map_level[2] && at->before[0] == (ssdgs_real)0.95);
-    for (int l = 0; l < 2; l++) CHECK(at->distance[l] == 2 && at->left[l] == (ssdgs_real)0.4);
-    CHECK(!level[4] && map[16 + 4].distance[0] == 0);
+    tile.record = record;
+    tile.list = list;
+    tile.depth = depth;
+    tile.count = ENTRIES;
+    tile.width = tile.height = 16;
+    tile.log2_threshold = -8;
+    tile.light_map = map;
+    k->walk_light(&tile, sums);
+    for (int lane = 0; lane < 16; lane++) {
+        const ssdgs_light_pixel *at = map + 16 + lane;
+        const double told[8] = {2,           2 + SPLIT, 3 + SPLIT,   0.95,
+                                0.95 * 0.42, 0.95,      0.95 * 0.42, 0.95 * 0.42 * 0.2},
+                     got[8] = {(double)at->distance[0], (double)at->distance[1], (double)at->distance[2],
+                               (double)at->left[0],     (double)at->left[1],     (double)at->before[0],
+                               (double)at->before[1],   (double)at->behind};
+        for (int i = 0; i < 8; i++) CHECK(fabs(got[i] / told[i] - 1) < 1e-6);
+    }
+    CHECK(map[0].distance[0] == 5 && fabs((double)map[0].left[0] - 0.99 * 0.99 * 0.99) < 1e-6);
 }
 
 int main(int argc, char **argv) {
@@ -1639,7 +1655,8 @@ int main(int argc, char **argv) {
     TEST_ROW("25", "coincident Gaussians", test_coincident());
     TEST_ROW("45", "slabs, gaps, added occluders", (test_layers(), test_gap(), test_veil(), test_occluder()));
     test_no_map();
-    test_map_batches();
+    for (int isa = 0; isa < SSDGS_ISA_COUNT; isa++)
+        if (contexts[isa][0]) test_map_batches(contexts[isa][0]->k);
     TEST_ROW("3", "images of one pixel, row, column; crops", test_crop());
     TEST_ROW("21,22", "scaled, moved, turned scenes", test_similarity());
     test_projection();
