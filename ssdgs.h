@@ -1474,6 +1474,8 @@ typedef struct ssdgs__adam_rate {
         int begin, int end, uint32_t at)) \
     K(void, walk_camera, (const ssdgs__tile *tile, uint16_t *blends, unsigned char *needed)) \
     K(void, walk_light, (const ssdgs__tile *tile, ssdgs_real *sums)) \
+    K(void, places, (const ssdgs__lighting *lighting, const ssdgs__tile *tile, int micro, \
+        const ssdgs_real *depth, const ssdgs_real *asked, ssdgs_real *ray, ssdgs_real *at)) \
     K(int, map_transmittance, (const ssdgs_splat_view *map, ssdgs_real bias, const ssdgs_real *at, \
         ssdgs_real *passed, ssdgs_real *slope)) \
     K(void, composite, (const ssdgs__tile *tile, int layers, const ssdgs_real *const *color, \
@@ -1569,12 +1571,6 @@ static SSDGS__INLINE int ssdgs__highest_bit(uint64_t mask) { /* of 0: 0 */
         if (mask >> bit >> half) bit += half;
     return bit;
 #endif
-}
-
-/* A walk's first transmittance: pixels outside the image can blend nothing. */
-static SSDGS__INLINE ssdgs_real ssdgs__start_transmittance(const ssdgs__tile *tile, int micro, int lane) {
-    const int x = tile->x + 4 * (micro & 3) + (lane & 3), y = tile->y + 4 * (micro >> 2) + (lane >> 2);
-    return x < tile->width && y < tile->height ? (ssdgs_real)1 : (ssdgs_real)-1;
 }
 
 /* ---- a light's map of where transmittance falls ---- */
@@ -6971,32 +6967,17 @@ static void ssdgs__light_transmittance(const ssdgs__kernels *k, const ssdgs_spla
 /* Where a tile keeps pixel i of 256: [micro-tile][4][16 lanes]. */
 static int ssdgs__tile_lane(int i) { return i / 16 * 64 + i % 16; }
 
-/* Where a micro-tile's pixels are in the world, rows of x, y and z, by their depth layer, and their cameras'
-   rays (x, y, 1), rows of x and y. asked: whose places count; the others stand at the eye. */
-static void ssdgs__places(const ssdgs__lighting *k, const ssdgs__tile *tile, int micro,
-                          const ssdgs_real *depth, const unsigned char *asked, ssdgs_real *ray,
-                          ssdgs_real *at) {
-    for (int i = 0; i < 16; i++) {
-        const ssdgs_real x = (ssdgs_real)(tile->x + 4 * (micro & 3) + (i & 3)),
-                         y = (ssdgs_real)(tile->y + 4 * (micro >> 2) + (i >> 2)),
-                         z = asked[i] ? depth[i] / depth[i + 32] : 0;
-        ray[i] = (x + (ssdgs_real)0.5 - k->cx) * k->inverse_fx;
-        ray[i + 16] = (y + (ssdgs_real)0.5 - k->cy) * k->inverse_fy;
-        for (int c = 0; c < 3; c++)
-            at[i + 16 * c] =
-                k->eye[c] + z * (k->view[c] * ray[i] + k->view[4 + c] * ray[i + 16] + k->view[8 + c]);
-    }
-}
-
-/* Transmittance from a light to the places of a micro-tile's pixels, -1 where no map knows them; 1 where they
-   are not asked for. */
-static void ssdgs__places_transmittance(const ssdgs_frame *frame, int light, const unsigned char *asked,
-                                        const ssdgs_real *at, ssdgs_real *passed, ssdgs_real *slope) {
+/* Transmittance from a light to the places of a micro-tile's pixels, by their depth layer, where passed is
+   -1. Also the camera's rays and the places, of `places`. */
+static void ssdgs__places_transmittance(const ssdgs_frame *frame, const ssdgs__lighting *lighting, int light,
+                                        const ssdgs__tile *tile, int micro, const ssdgs_real *depth,
+                                        ssdgs_real *passed, ssdgs_real *ray, ssdgs_real *at,
+                                        ssdgs_real *slope) {
+    const ssdgs__kernels *k = frame->context->k;
     const ssdgs__light_memory *own = ssdgs__light_memories(frame) + light;
     const ssdgs_splat_view *first = frame->views + own->first;
-    for (int i = 0; i < 16; i++) passed[i] = asked[i] ? -1 : 1;
-    ssdgs__light_transmittance(frame->context->k, first, first + own->views, frame->bias[1], at, passed,
-                               slope);
+    k->places(lighting, tile, micro, depth, passed, ray, at);
+    ssdgs__light_transmittance(k, first, first + own->views, frame->bias[1], at, passed, slope);
 }
 
 /* What the light's map says of a tile's pixels, [micro-tile][4][16 lanes]: the transmittance to the place at
@@ -7010,18 +6991,21 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 64 * micro,
                          *own = layers + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + 64 * micro + 16;
         ssdgs_real ray[32], at[48], *passed = visibility + 64 * micro;
-        unsigned char asked[16];
         int any = 0;
-        for (int i = 0; i < 16; i++) any += asked[i] = k->shadow && depth[i + 32] > SSDGS__THIN;
-        if (any) ssdgs__places(k, tile, micro, depth, asked, ray, at);
-        ssdgs__places_transmittance(frame, light, asked, at, passed, NULL);
-        for (int i = 0; i < 16 && any; i++) {
-            const int known = passed[i] >= 0; /* the Gaussians' has what the occluder says already */
-            if (!known) passed[i] = own[i] / depth[i + 32];
-            if (!frame->occluder || !asked[i] || !known) continue;
-            for (int c = 0; c < 3; c++) points[3 * points_count + c] = at[i + 16 * c];
-            fraction[points_count] = 1;
-            lanes[points_count++] = 64 * micro + i;
+        for (int i = 0; i < 16; i++) {
+            const int asked = k->shadow && depth[i + 32] > SSDGS__THIN;
+            passed[i] = asked ? -1 : 1;
+            any |= asked;
+        }
+        if (!any) continue;
+        ssdgs__places_transmittance(frame, k, light, tile, micro, depth, passed, ray, at, NULL);
+        for (int i = 0; i < 16; i++) {
+            if (passed[i] < 0) passed[i] = own[i] / depth[i + 32]; /* has what the occluder says already */
+            else if (frame->occluder && depth[i + 32] > SSDGS__THIN) {
+                for (int c = 0; c < 3; c++) points[3 * points_count + c] = at[i + 16 * c];
+                fraction[points_count] = 1;
+                lanes[points_count++] = 64 * micro + i;
+            }
         }
     }
     if (!points_count) return;
@@ -7128,6 +7112,9 @@ static void ssdgs__composite_task(void *data, int index) {
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer) : job->color;
+    for (int y = tile.y; y < tile.y + 16 && y < tile.height; y++) /* else storing would wait for memory */
+        for (int c = 0; c < 4; c++)
+            SSDGS__PREFETCH(job->planes[c] + (size_t)y * (size_t)tile.width + (size_t)tile.x);
     ssdgs_real scene_depth[256], median[256];
     ssdgs__tile_scene_depth(frame, &tile, scene_depth);
     if (job->color == frame->color && frame->median_depth) {
@@ -7206,11 +7193,12 @@ static void ssdgs__place_backward(const ssdgs_frame *frame, const ssdgs__lightin
         ssdgs_real ray[32], at[48], slope[48], passed[16], *ddepth = gradient + layer;
         unsigned char asked[16];
         int any = 0;
-        for (int i = 0; i < 16; i++)
-            any += asked[i] = (dv[i] < 0 || dv[i] > 0) && depth[i + 32] > SSDGS__THIN;
+        for (int i = 0; i < 16; i++) {
+            any |= asked[i] = (dv[i] < 0 || dv[i] > 0) && depth[i + 32] > SSDGS__THIN;
+            passed[i] = asked[i] ? -1 : 1;
+        }
         if (!any) continue;
-        ssdgs__places(k, tile, micro, depth, asked, ray, at);
-        ssdgs__places_transmittance(frame, light, asked, at, passed, slope);
+        ssdgs__places_transmittance(frame, k, light, tile, micro, depth, passed, ray, at, slope);
         for (int i = 0; i < 16; i++) {
             const ssdgs_real cover = depth[i + 32], z = depth[i] / cover;
             ssdgs_real along = 0;
@@ -7494,23 +7482,21 @@ static void ssdgs__rows_task(void *data, int index) {
     const size_t plane = (size_t)w * (size_t)h;
     for (int y = index * SSDGS__BAND; y < end; y++) {
         const ssdgs_real *t = transmittance + (size_t)y * (size_t)w,
-                         *red = job->planes + (size_t)y * (size_t)w;
+                         *red = job->planes ? job->planes + (size_t)y * (size_t)w : NULL;
         ssdgs_real *rgb = job->out + (size_t)y * (size_t)job->stride * 3;
         for (int x = 0; n == 3 && x < w; x++, rgb += 3) {
             rgb[0] = red[x] + t[x] * job->background[0];
             rgb[1] = red[plane + (size_t)x] + t[x] * job->background[1];
             rgb[2] = red[2 * plane + (size_t)x] + t[x] * job->background[2];
         }
-        for (int c = 0; n != 3 && c < n; c++) {
-            const ssdgs_real *from = job->planes + plane * (size_t)c + (size_t)y * (size_t)w,
-                             background = job->background[c];
-            ssdgs_real *out = job->out + (size_t)y * (size_t)job->stride * (size_t)n + c;
-            for (int x = 0; x < w; x++) out[x * n] = from[x] + t[x] * background;
-        }
+        for (int x = 0; n == 1 && x < w; x++)
+            job->out[(size_t)y * (size_t)job->stride + (size_t)x] =
+                (job->planes ? red[x] : 1) + t[x] * job->background[0];
     }
 }
 
-/* Planes to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. */
+/* Planes, one or three, to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. A plane
+   of NULL is 1. */
 static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride,
                               const ssdgs_real *background, ssdgs_real *out) {
     ssdgs__rows_job job;
@@ -7606,10 +7592,8 @@ static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, 
         ssdgs__write_rows(frame, frame->pixels, 3, stride, frame->options.background, image->color);
     if (image->median_depth)
         ssdgs__write_rows(frame, frame->median_depth, 1, stride, NULL, image->median_depth);
-    for (int y = 0; image->alpha && y < camera->height; y++)
-        for (int x = 0; x < camera->width; x++)
-            image->alpha[(size_t)y * (size_t)stride + (size_t)x] =
-                1 - frame->transmittance[(size_t)y * (size_t)camera->width + (size_t)x];
+    static const ssdgs_real less[3] = {-1, 0, 0};
+    if (image->alpha) ssdgs__write_rows(frame, NULL, 1, stride, less, image->alpha);
     ssdgs_real *planes = NULL;
     if (ssdgs__components_asked(image)) SSDGS__RESERVE(frame->scratch->image, planes, ssdgs_real, pixels * 3);
     for (int c = 0; c < 4; c++) {
@@ -12886,6 +12870,18 @@ SSDGS__FI void F(pixel_centres)(const ssdgs__tile *tile, int micro, V *px, V *py
     }
 }
 
+/* A walk's first transmittances: pixels outside the image can blend nothing. */
+SSDGS__FI void F(start)(const ssdgs__tile *tile, R (*transmittance)[16]) {
+    const V wide = V_SET(tile->width), high = V_SET(tile->height), one = V_SET(1), none = V_SET(-1);
+    for (int micro = 0; micro < 16; micro++) {
+        V px[SSDGS__NV], py[SSDGS__NV];
+        F(pixel_centres)(tile, micro, px, py);
+        for (int v = 0; v < SSDGS__NV; v++)
+            V_STORE(transmittance[micro] + v * SSDGS__VW,
+                    V_SEL(V_AND(V_LT(px[v], wide), V_LT(py[v], high)), one, none));
+    }
+}
+
 /* Transmittance walk of the camera: per entry, the micro-tiles where a pixel blends it, and with max_error >
    0 whether it must be shaded. A pixel passes over small weights as long as their sum stays within max_error,
    so what no pixel needs adds up to no more than that in any. */
@@ -12899,11 +12895,8 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
     memset(blends, 0, tile->count * sizeof *blends);
     if (thrifty) memset(needed, 0, tile->count);
     R transmittance[16][16], passed_over[16][16];
-    for (int micro = 0; micro < 16; micro++)
-        for (int v = 0; v < 16; v++) {
-            transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
-            passed_over[micro][v] = 0;
-        }
+    F(start)(tile, transmittance);
+    memset(passed_over, 0, sizeof passed_over);
     while (from < tile->count && live) {
         F(batch_gather)(&batch, tile, &from);
         for (int micro = 0; micro < 16; micro++) {
@@ -12938,7 +12931,12 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                     }
                     t[v] = V_FNMA(alpha, t[v], t[v]);
                 }
-                blends[place] = (uint16_t)(blends[place] | (unsigned)(any != 0) << micro);
+                if (!any) {
+                    V_UNROLL for (int v = 0; v < SSDGS__NV; v++) any |= V_BITS(V_GE(t[v], stop));
+                    if (!any) break; /* all have stopped, for the rest of the batch too */
+                    continue;
+                }
+                blends[place] = (uint16_t)(blends[place] | 1u << micro);
                 if (thrifty) needed[place] = (unsigned char)(needed[place] | (must != 0));
             }
             V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
@@ -13122,6 +13120,28 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
 }
 
+/* Where a micro-tile's pixels are in the world, rows of x, y and z, by their depth layer, and the camera's
+   rays (x, y, 1) through them, rows of x and y. Where asked is not below 0 they stand at the eye. */
+SSDGS__FN void F(places)(const ssdgs__lighting *k, const ssdgs__tile *tile, int micro, const R *depth,
+                         const R *asked, R *ray, R *at) {
+    V px[SSDGS__NV], py[SSDGS__NV];
+    F(pixel_centres)(tile, micro, px, py);
+    for (int v = 0; v < SSDGS__NV; v++) {
+        const int lane = v * SSDGS__VW;
+        const V z = V_DIV(V_LOAD(depth + lane), V_LOAD(depth + 32 + lane));
+        const V depth_asked = V_SEL(V_LT(V_LOAD(asked + lane), V_SET(0)), z, V_SET(0));
+        const V x = V_MUL(V_SUB(px[v], V_SET(k->cx)), V_SET(k->inverse_fx));
+        const V y = V_MUL(V_SUB(py[v], V_SET(k->cy)), V_SET(k->inverse_fy));
+        V_STORE(ray + lane, x);
+        V_STORE(ray + 16 + lane, y);
+        for (int c = 0; c < 3; c++) {
+            const V xy = V_ADD(V_MUL(V_SET(k->view[c]), x), V_MUL(V_SET(k->view[4 + c]), y));
+            const V along = V_MUL(depth_asked, V_ADD(xy, V_SET(k->view[8 + c])));
+            V_STORE(at + 16 * c + lane, V_ADD(V_SET(k->eye[c]), along));
+        }
+    }
+}
+
 /* Transmittance at distances from the light, by pixels of its map, columns of ssdgs_light_pixel. After a fall
    it stays at what that left, until `thick` ahead of the next fall, then goes linearly to what there was
    before that one. steep: its derivative by the distance, or NULL. */
@@ -13232,10 +13252,9 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
     const int at_once = SSDGS__NV == 1 ? layers : 1; /* as many sums as there are registers */
     memset(pixels, 0, (size_t)layers * SSDGS__TILE_LAYER * sizeof *pixels);
     R transmittance[16][16];
-    for (int micro = 0; micro < 16; micro++) {
+    F(start)(tile, transmittance);
+    for (int micro = 0; micro < 16; micro++)
         for (int v = 0; v < 16; v++) pixels[micro * 64 + SSDGS__TILE_FOURTH + v] = 1;
-        for (int v = 0; v < 16; v++) transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
-    }
     R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16];
     int which[SSDGS__BATCH];
     while (from < tile->count) {
@@ -13333,11 +13352,8 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                 F(transpose4)(rows, 16, scratch + (micro * 16 + i) * width + 4 * layer, (size_t)width);
             }
     R passed[16][16], transmittance[16][16];
-    for (int micro = 0; micro < 16; micro++)
-        for (int v = 0; v < 16; v++) {
-            passed[micro][v] = 0;
-            transmittance[micro][v] = ssdgs__start_transmittance(tile, micro, v);
-        }
+    F(start)(tile, transmittance);
+    memset(passed, 0, sizeof passed);
     R local[SSDGS__LAYERS][SSDGS__BATCH][4], weight[SSDGS__BATCH][16];
     int which[SSDGS__BATCH];
     while (from < tile->count) {
