@@ -1284,8 +1284,10 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 
 #ifdef SSDGS_REAL64
 #define SSDGS__SQRT(x) sqrt(x)
+#define SSDGS__MOST DBL_MAX
 #else
 #define SSDGS__SQRT(x) sqrtf(x)
+#define SSDGS__MOST FLT_MAX
 #endif
 
 #define SSDGS__BLOCK 64 /* Gaussians shaded together */
@@ -1522,7 +1524,7 @@ typedef struct ssdgs__adam_rate {
     T(void, ssim_row, (const ssdgs__ssim_row *row, ssdgs_real *sums)) \
     T(void, ssim_backward_row, (const ssdgs__ssim_row *row, ssdgs_real by_l1, ssdgs_real by_ssim, \
         ssdgs_real *gradient)) \
-    K(int, finite, (const ssdgs_real *values, size_t n)) \
+    K(int, within, (const ssdgs_real *values, size_t n, ssdgs_real most)) \
     T(void, adam, (ssdgs_real *parameter, const ssdgs_real *gradient, ssdgs_real *mean, \
         ssdgs_real *square, size_t n, const ssdgs__adam_rate *rate))
 /* clang-format on */
@@ -2799,7 +2801,7 @@ SSDGS_API void ssdgs_model_destroy(ssdgs_model *model) {
 static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
     static const char *const names[SSDGS__GLOBAL_GROUPS] = {"asg_basis", "asg_sharpness", "asg_sigma",
                                                             "the scattering network", "the shadow network"};
-    if (model->context->k->finite(model->globals, model->global_count)) return SSDGS_OK;
+    if (model->context->k->within(model->globals, model->global_count, SSDGS__MOST)) return SSDGS_OK;
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     size_t i;
@@ -6125,6 +6127,24 @@ static size_t ssdgs__block_lane(const ssdgs__shade_job *job, int block, int s) {
     return job->frame->shaded[b->first + (s < b->live ? s : b->live - 1)];
 }
 
+/* Which fours of a block's lanes come from four places in a row, as bits: most do. */
+static unsigned ssdgs__fours(const size_t from[SSDGS__BLOCK]) {
+    unsigned fours = 0;
+    for (int s = 0; s < SSDGS__BLOCK; s += 4)
+        fours |=
+            (unsigned)(from[s + 1] == from[s] + 1 && from[s + 2] == from[s] + 2 && from[s + 3] == from[s] + 3)
+            << s / 4;
+    return fours;
+}
+
+static void ssdgs__gather(const ssdgs_real *plane, const size_t from[SSDGS__BLOCK], unsigned fours,
+                          ssdgs_real *row) {
+    for (int s = 0; s < SSDGS__BLOCK; s += 4, fours >>= 1)
+        if (fours & 1) memcpy(row + s, plane + from[s], 4 * sizeof *row);
+        else
+            for (int i = s; i < s + 4; i++) row[i] = plane[from[i]];
+}
+
 /* The shadow network's outputs for the Gaussians of a block, if all of them are known; it does not see the
    camera. */
 static int ssdgs__shadow_recall(const ssdgs__shade_job *job, int light, const size_t at[SSDGS__BLOCK],
@@ -6423,14 +6443,13 @@ SSDGS__SMALL_END
 
 /* The colours that no light makes, as they are seen from the eye: stored values, decoded where the frame
    blends linear light, unless a baked model has linear ones. */
-static void ssdgs__kept(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t at[SSDGS__BLOCK],
+static void ssdgs__kept(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t own[SSDGS__BLOCK],
                         const ssdgs_real *position, ssdgs_real *rows, ssdgs_real *kept) {
     const ssdgs__kernels *k = frame->context->k;
     const int first = ssdgs__kept_plane(&o->settings);
     for (int c = first; c < o->gaussians.channels; c++) {
         const ssdgs_real *plane = o->gaussians.gaussians + (size_t)c * o->gaussians.stride;
-        ssdgs_real *row = rows + (c - first) * SSDGS__BLOCK;
-        for (int s = 0; s < SSDGS__BLOCK; s++) row[s] = plane[at[s] - (size_t)o->first];
+        ssdgs__gather(plane, own, ssdgs__fours(own), rows + (c - first) * SSDGS__BLOCK);
     }
     k->harmonics(position, rows, o->settings.harmonics, ssdgs__lightings(frame, o)->eye, kept);
     if (frame->settings.transfer == SSDGS_TRANSFER_SRGB &&
@@ -6449,24 +6468,33 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     const size_t n = (size_t)frame->count, blocks = (n + SSDGS__BLOCK - 1) / SSDGS__BLOCK;
     ssdgs_real *gauss = memory + l->gauss, *outs = scratch + l->outs, *inputs = scratch + l->inputs;
     const int live = job->block[block].live;
-    size_t at[SSDGS__BLOCK];
-    for (int s = 0; s < SSDGS__BLOCK; s++) at[s] = ssdgs__block_lane(job, block, s);
+    size_t at[SSDGS__BLOCK], own[SSDGS__BLOCK], sums[SSDGS__BLOCK]; /* in the frame, the object, transport */
+    for (int s = 0; s < SSDGS__BLOCK; s++) {
+        at[s] = ssdgs__block_lane(job, block, s);
+        own[s] = at[s] - (size_t)o->first;
+        sums[s] = at[s] / SSDGS__BLOCK * SSDGS__LENGTHS * SSDGS__BLOCK + at[s] % SSDGS__BLOCK;
+    }
+    const unsigned fours = ssdgs__fours(at), sums_fours = ssdgs__fours(sums);
+    const ssdgs_real most = (ssdgs_real)1e30; /* in layers: products with lobes must be finite */
+    int sound = 1;                            /* none has more */
     const int bare = settings->baked && !o->light_count && !frame->layer_count &&
                      !frame->diffuse; /* needs a colour alone */
     for (int i = 0; i < (bare ? SSDGS_ROTATION : SSDGS_CHANNELS); i++) {
-        const ssdgs_real *plane = o->gaussians.gaussians + (size_t)i * o->gaussians.stride;
+        ssdgs_real *row = gauss + i * SSDGS__BLOCK;
         const int neutral = settings->baked && i >= SSDGS_ROTATION;
-        for (int s = 0; s < SSDGS__BLOCK; s++)
-            gauss[i * SSDGS__BLOCK + s] = neutral ? ssdgs__neutral(i) : plane[at[s] - (size_t)o->first];
+        if (!neutral)
+            ssdgs__gather(o->gaussians.gaussians + (size_t)i * o->gaussians.stride, own, fours, row);
+        for (int s = 0; neutral && s < SSDGS__BLOCK; s++) row[s] = ssdgs__neutral(i);
     }
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     ssdgs_real factors[4 * SSDGS__BLOCK], rest[SSDGS__BLOCK], *kept = scratch + l->kept;
     const int edited = ssdgs__object_factors(frame, o, at, gauss, factors);
-    if (o->kept > 0) ssdgs__kept(frame, o, at, gauss, scratch + l->harmonics, kept);
+    if (o->kept > 0) ssdgs__kept(frame, o, own, gauss, scratch + l->harmonics, kept);
     for (int s = 0; s < SSDGS__BLOCK; s++) rest[s] = 1; /* what of it no light takes for its own */
     const int medium = ssdgs__has_medium(settings, o->terms);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
     if (frame->layer_count && o->turned) ssdgs__lobe_turn(o, scratch + l->lobe);
+    if (frame->layer_count) sound = k->within(scratch + l->lobe, SSDGS__LOBE * SSDGS__BLOCK, most);
     const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, o->gaussians.scattering};
     const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, o->gaussians.shadow};
     for (int light = 0; light < frame->light_count; light++) {
@@ -6492,27 +6520,27 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int s = 0; !lit && s < SSDGS__BLOCK; s++) outs[SSDGS__OUT_SHADOW * SSDGS__BLOCK + s] += 1;
         if (!lit) continue;
         k->reflect(lighting, gauss, part + l->rows);
+        ssdgs_real *visibility = part + l->visibility, *cue = part + l->cue, light_in[SSDGS__BLOCK],
+                   facing[SSDGS__BLOCK];
+        if (lighting->shadow) ssdgs__gather(frame->visibility + n * (size_t)light, at, fours, visibility);
+        for (int s = 0; !lighting->shadow && s < SSDGS__BLOCK; s++) visibility[s] = 1;
+        const int cued = lighting->scattering && settings->depth_cue && casts;
+        if (cued) ssdgs__gather(frame->depth_cue + n * (size_t)light, at, fours, cue);
         for (int s = 0; s < SSDGS__BLOCK; s++) {
-            const size_t of_light = n * (size_t)light + at[s];
-            part[l->visibility + (size_t)s] = lighting->shadow ? frame->visibility[of_light] : 1;
-            part[l->cue + (size_t)s] = lighting->scattering && settings->depth_cue && casts
-                                           ? frame->depth_cue[of_light] / (o->scale * o->translucency)
-                                           : 0;
+            const ssdgs_real irradiance = part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
+            cue[s] = cued ? cue[s] / (o->scale * o->translucency) : 0;
+            light_in[s] = irradiance > 0 ? irradiance : 1;
+            facing[s] = irradiance > 0;
         }
-        const ssdgs_real *irradiance = part + l->rows + SSDGS__IRRADIANCE * SSDGS__BLOCK,
-                         *cosine = part + l->rows + SSDGS__COSINE * SSDGS__BLOCK;
         for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS; i++) {
             ssdgs_real *to =
                 part + l->transport + i * SSDGS__BLOCK; /* in units of the irradiance of its own */
-            const ssdgs_real even = casts ? 0 : (ssdgs_real)ssdgs__beneath_plane(i);
+            const ssdgs_real *cosine = part + l->rows + SSDGS__COSINE * SSDGS__BLOCK,
+                             even = (ssdgs_real)ssdgs__beneath_plane(i);
             const size_t first = (blocks * (size_t)light * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK;
-            for (int s = 0; s < SSDGS__BLOCK; s++) {
-                const size_t from =
-                    at[s] / SSDGS__BLOCK * SSDGS__LENGTHS * SSDGS__BLOCK + at[s] % SSDGS__BLOCK;
-                to[s] = !casts              ? cosine[s] * even
-                        : irradiance[s] > 0 ? job->transport[first + from] / irradiance[s]
-                                            : 0;
-            }
+            if (casts) ssdgs__gather(job->transport + first, sums, sums_fours, to);
+            for (int s = 0; s < SSDGS__BLOCK; s++)
+                to[s] = casts ? to[s] / light_in[s] * facing[s] : cosine[s] * even;
         }
         if (l->shadow_layers && lighting->shadow) {
             shadow = part + l->scattering_at - SSDGS__BLOCK;
@@ -6541,6 +6569,9 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             ssdgs__medium_rows(lighting, o->medium, gauss, part + l->rows, part + l->transport, outs);
         if (lighting->deferred) {
             if (edited) ssdgs__edit_rows(factors, 6, outs);
+            sound = sound && k->within(outs, SSDGS__OUT_SCATTERING * SSDGS__BLOCK, most) &&
+                    k->within(visibility, SSDGS__BLOCK, most) &&
+                    (!shadow || k->within(shadow, SSDGS__BLOCK, most));
             ssdgs__layer_store(frame, SSDGS__LIGHT_LAYER + layer, at, live,
                                outs + SSDGS__OUT_SPECULAR * SSDGS__BLOCK);
             ssdgs__layer_store(frame, SSDGS__DIFFUSE_LAYER + layer, at, live, outs);
@@ -6548,7 +6579,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             for (int s = 0; s < live; s++) {
                 ssdgs_real *to = ssdgs__layer(frame, SSDGS__SHADOW_LAYER + layer) + 4 * at[s];
                 to[0] = shadow ? shadow[s] : 0;
-                to[1] = part[l->visibility + (size_t)s];
+                to[1] = visibility[s];
                 to[2] = scratch[l->lobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + (size_t)s];
             }
         }
@@ -6578,9 +6609,9 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             color[c] = to[c * SSDGS__BLOCK] + to[(SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK] +
                        to[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK];
             black |= !ssdgs__finite(color[c]);
-            for (int i = 1; i <= frame->layer_count; i++) { /* their products with lobes must be finite too */
+            for (int i = 1; i <= frame->layer_count && !sound; i++) {
                 const ssdgs_real value = ssdgs__layer(frame, i)[4 * g + (size_t)c];
-                black |= !(value <= (ssdgs_real)1e30 && value >= (ssdgs_real)-1e30);
+                black |= !(value <= most && value >= -most);
             }
         }
         for (int i = 1; i <= frame->layer_count && black; i++)
@@ -7603,7 +7634,8 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
         int finite = 1;
         stats->gaussians += g->count;
         for (size_t c = 0; c < SSDGS_DIFFUSE; c++)
-            finite = finite && frame->context->k->finite(g->gaussians + c * g->stride, (size_t)g->count);
+            finite = finite &&
+                     frame->context->k->within(g->gaussians + c * g->stride, (size_t)g->count, SSDGS__MOST);
         for (size_t i = 0; i < (size_t)g->count && !finite; i++)
             for (size_t c = 0; c < SSDGS_DIFFUSE; c++) {
                 const ssdgs_real value = g->gaussians[c * g->stride + i];
@@ -10065,7 +10097,7 @@ typedef struct ssdgs__adam_job {
 static void ssdgs__finite_task(void *data, int index) {
     ssdgs__adam_job *job = (ssdgs__adam_job *)data;
     ssdgs__adam_range *r = job->range + index;
-    if (job->k->finite(r->gradient, r->n)) return;
+    if (job->k->within(r->gradient, r->n, SSDGS__MOST)) return;
     for (size_t i = 0; i < r->n && !r->bad; i++)
         if (!ssdgs__finite(r->gradient[i])) r->bad = i + 1;
 }
@@ -13193,7 +13225,7 @@ SSDGS__FI V F(pixel_transmittance)(R (*pixel)[SSDGS__VW], V distance, V thick, V
    map: passed, where it is -1 and the map has the place. Returns whether any is left at -1. slope: rows of
    its gradient by the place, or NULL. */
 SSDGS__FN int F(map_transmittance)(const ssdgs_splat_view *map, R bias, const R *at, R *passed, R *slope) {
-    static const ssdgs_light_pixel open = {{SSDGS__NEVER, SSDGS__NEVER, SSDGS__NEVER}, {1, 1}, {1, 1}, 1};
+    static const ssdgs_light_pixel open = {{SSDGS__NEVER, SSDGS__NEVER, SSDGS__NEVER}, {0, 0}, {0, 0}, 0};
     const V zero = V_SET(0), one = V_SET(1), half = V_SET(0.5), tiny = V_SET(1e-6), thick = V_SET(bias);
     const V wide = V_SET(map->width - 1), high = V_SET(map->height - 1);
     const R *m = map->view;
@@ -14697,15 +14729,15 @@ SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size
     }
 }
 
-/* Whether all of n values are finite. */
-SSDGS__FN int F(finite)(const R *values, size_t n) {
+/* Whether all of n values are within -most .. most. */
+SSDGS__FN int F(within)(const R *values, size_t n, R most) {
     size_t i = 0;
     int bad = 0;
 #if SSDGS__VW > 1
     for (; i + SSDGS__VW <= n; i += SSDGS__VW)
-        bad |= V_BITS(V_GE(V_SET(FLT_MAX), V_ABS(V_LOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
+        bad |= V_BITS(V_GE(V_SET(most), V_ABS(V_LOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
 #endif
-    for (; i < n; i++) bad |= !ssdgs__finite(values[i]);
+    for (; i < n; i++) bad |= !ssdgs__finite(values[i]) || values[i] > most || values[i] < -most;
     return !bad;
 }
 
