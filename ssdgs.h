@@ -4714,9 +4714,10 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         if (components || training) {
             const size_t lit_pixels = ssdgs__times(pixels, (size_t)frame->light_count);
             SSDGS__RESERVE(w->layer_pixels, frame->layer_pixels, ssdgs_real,
-                           ssdgs__times(pixels * 3, (size_t)frame->layer_count + 1));
+                           ssdgs__times(pixels * 3, components ? (size_t)frame->layer_count + 1
+                                                               : (size_t)SSDGS__LIGHT_LAYER));
             SSDGS__RESERVE(w->pixel_visibility, frame->pixel_visibility, ssdgs_real, lit_pixels);
-            SSDGS__RESERVE(w->pixel_shadow, frame->pixel_shadow, ssdgs_real, lit_pixels);
+            if (components) SSDGS__RESERVE(w->pixel_shadow, frame->pixel_shadow, ssdgs_real, lit_pixels);
         }
         if (training) SSDGS__RESERVE(w->layer_gradient, frame->layer_gradient, ssdgs_real, layers);
     }
@@ -7135,7 +7136,7 @@ static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile,
         else ssdgs__pixel_visibility(frame, lighting, light, tile, pixels, visibility);
         k->highlight(lighting, tile, pixels, visibility);
     } else memset(visibility, 0, sizeof visibility);
-    if (!frame->layer_pixels) return;
+    if (!frame->pixel_shadow) return;
     if (later)
         ssdgs__join_shadows(frame, tile, light, pixels + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER,
                             pixels + SSDGS__DIFFUSE_LAYER * SSDGS__TILE_LAYER, visibility);
@@ -7195,10 +7196,11 @@ static void ssdgs__composite_task(void *data, int index) {
         tile.median = NULL;
         if (frame->layer_count && layers == 1)
             memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
-        for (int layer = 0; frame->layer_count && layer < SSDGS__LIGHT_LAYER; layer++)
+        for (int layer = frame->pixel_shadow ? 0 : SSDGS__DEPTH_LAYER;
+             frame->layer_count && layer < SSDGS__LIGHT_LAYER; layer++)
             ssdgs__layer_pixels_store(frame, &tile, layer, later, pixels + layer * SSDGS__TILE_LAYER);
         for (int light = 0; frame->layer_count && light < frame->light_count; light++)
-            if (frame->layer_pixels || ssdgs__reaches_tile(frame, &tile, light))
+            if (frame->pixel_shadow || ssdgs__reaches_tile(frame, &tile, light))
                 ssdgs__light_tile(frame, &tile, light, later, pixels);
         ssdgs__tile_store(&tile, pixels, later ? 3 : 4, later, job->planes);
         tile.material = ssdgs__material_after(&tile, tile.material);
@@ -7303,43 +7305,39 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     ssdgs_real gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int c = 0; c < 4; c++)
         ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
-    for (int layer = 0; layer < (deferred ? SSDGS__LIGHT_LAYER : 1); layer++)
-        for (int c = 0; c < 3; c++)
-            ssdgs__tile_load(
-                &tile, deferred ? ssdgs__layer_plane(frame, layer, c) : frame->pixels + plane * (size_t)c, c,
-                pixels + layer * SSDGS__TILE_LAYER);
-    ssdgs__tile_load(&tile, frame->transmittance, 3, pixels);
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER]; /* as the forward's, which would fill memory */
+    const ssdgs_real *color[SSDGS__LAYERS];
+    for (int layer = 0; layer < layers; layer++) color[layer] = ssdgs__layer(frame, layer);
+    k->composite(&tile, layers, color, pixels);
     memset(gradient + SSDGS__TILE_LAYER, 0, (size_t)(layers - 1) * SSDGS__TILE_LAYER * sizeof *gradient);
     for (int c = 0; deferred && frame->normal_gradient && c < 4; c++)
         ssdgs__tile_load(&tile, frame->normal_gradient + plane * (size_t)c, c < 3 ? c : 2,
                          gradient + (SSDGS__DEPTH_LAYER + (c < 3)) * SSDGS__TILE_LAYER);
-    const ssdgs_real *color[SSDGS__LAYERS];
     for (int light = deferred ? frame->light_count - 1 : -1; light >= 0; light--) {
+        const ssdgs__lighting *lighting = job->lightings + light;
         const int first = SSDGS__LIGHT_LAYER + SSDGS__PER_LIGHT * light;
-        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
-            for (int c = 0; c < 3; c++)
-                ssdgs__tile_load(&tile, ssdgs__layer_plane(frame, first + layer, c), c,
-                                 pixels + lit + layer * SSDGS__TILE_LAYER);
         ssdgs_real visibility[SSDGS__TILE_LAYER];
-        ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, visibility);
+        for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++)
+            color[SSDGS__LIGHT_LAYER + layer] = ssdgs__layer(frame, first + layer);
+        if (frame->light_count > 1)
+            k->composite(&tile, SSDGS__PER_LIGHT, color + SSDGS__LIGHT_LAYER, pixels + lit);
+        if (frame->visibility_given)
+            ssdgs__tile_load(&tile, frame->pixel_visibility + plane * (size_t)light, 0, visibility);
+        else ssdgs__pixel_visibility(frame, lighting, light, &tile, pixels, visibility);
         ssdgs_real *highlight_sums =
             job->highlight_sums +
             ((size_t)index * (size_t)frame->light_count + (size_t)light) * SSDGS__HIGHLIGHT_SUMS;
-        k->highlight_backward(job->lightings + light, &tile, pixels, visibility, gradient, highlight_sums);
+        k->highlight_backward(lighting, &tile, pixels, visibility, gradient, highlight_sums);
         if (!frame->visibility_given)
-            ssdgs__place_backward(frame, job->lightings + light, light, &tile, pixels, gradient,
-                                  highlight_sums);
+            ssdgs__place_backward(frame, lighting, light, &tile, pixels, gradient, highlight_sums);
         if (!light) continue; /* its layers are walked below */
         for (int layer = 0; layer < SSDGS__PER_LIGHT; layer++) {
             const int at = lit + layer * SSDGS__TILE_LAYER;
-            *color = ssdgs__layer(frame, first + layer);
             ssdgs__gradient_product(pixels + at, gradient + at, 1, 0);
-            k->composite_backward(&tile, 1, color, gradient + at, pixels + at, sums, job->stride,
-                                  first + layer);
+            k->composite_backward(&tile, 1, color + SSDGS__LIGHT_LAYER + layer, gradient + at, pixels + at,
+                                  sums, job->stride, first + layer);
         }
     }
-    for (int layer = 0; layer < layers; layer++) color[layer] = ssdgs__layer(frame, layer);
     ssdgs__gradient_product(pixels, gradient, layers, 1);
     k->composite_backward(&tile, layers, color, gradient, pixels, sums, job->stride, 0);
 }

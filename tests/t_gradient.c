@@ -476,7 +476,7 @@ static void test_empty_tiles(void) {
     if (!CHECK(!ssdgs_model_create(context, &settings, 1, &model))) exit(1);
     for (size_t i = 0; i < 3; i++) model->gaussians[(SSDGS_LOG_SCALE + i) * model->capacity] = -4;
     ssdgs_frame frame;
-    if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 0, 1)) exit(1);
+    if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 1, 0)) exit(1);
     const size_t count = (size_t)(3 * (1 + frame.layer_count)) * WIDE * WIDE;
     for (size_t i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
     if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE)) exit(1);
