@@ -533,10 +533,8 @@ typedef struct ssdgs_render_options {
     ssdgs_real background[3]; /* linear; settings.transfer none: as stored */
     ssdgs_real stop; /* 0 .. 1: pixels, a light map's too, are done below this transmittance; 0 = never */
     ssdgs_real alpha_threshold; /* 0 .. 1: a splat is not drawn at pixels where its alpha is below this */
-    ssdgs_real max_error; /* 0 .. 1: Gaussians whose weights sum to less in every pixel are not shaded. Above
-                             0, where all highlights are deferred, Gaussians take their visibility (eq. 7)
-                             from the lights' maps, as pixels do */
-    ssdgs_real light_detail;     /* 0.01 .. 8: resolution of the light maps; 1 = the model's choice */
+    ssdgs_real max_error;    /* 0 .. 1: Gaussians whose weights sum to less in every pixel are not shaded */
+    ssdgs_real light_detail; /* 0.01 .. 8: resolution of the light maps; 1 = the model's choice */
     ssdgs_real transport_detail; /* 0.1 .. 8: accuracy of true dipole transport; 1 = 1 % off at most, about */
     ssdgs_real ambient[9][3];    /* RGB, light from all around: see below; 0 = none */
 } ssdgs_render_options;
@@ -546,7 +544,7 @@ typedef struct ssdgs_render_options {
    what of an even sky its own model leaves it, which is found anew after each change of the model. Shadows do
    not change it; image.scattering has it. */
 
-/* For games (max_error 1/16, stop 1/1024, transport_detail 0.7), the method as written, for speed (max_error
+/* For games (max_error 1/8, stop 1/1024, transport_detail 0.6), the method as written, for speed (max_error
    1/4, stop 1/256, light_detail 0.7, transport_detail 0.6) and for previews (max_error 1/2, stop 1/64,
    light_detail 0.6, transport_detail 0.4, alpha_threshold 2/255). SPEED in the manual says what they lose. */
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
@@ -1072,7 +1070,6 @@ typedef struct ssdgs_frame {
         *pixel_shadow;              /* (lights, h, w) v, S where light is deferred; as layer_pixels */
     const ssdgs_occluder *occluder; /* NULL: none; for WALK and COMPOSITE */
     int maps;                       /* 1: light maps are asked for, whoever needs them */
-    int looked_up; /* 1: visibility comes from the maps, at the Gaussians' centres, not from eq. 7's sums */
     int visibility_given; /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other
                              means */
     /* backward */
@@ -1389,9 +1386,8 @@ typedef struct ssdgs__tile {
     uint32_t count;
     int x, y, width, height;
     ssdgs_real log2_threshold, stop, max_error, bias, depth_origin, cx, cy, inverse_focal;
-    int visibility, cue, flux;          /* 1: a light's walk finds them */
-    int orthographic;                   /* 1: the view is */
-    ssdgs_light_pixel *light_map;       /* of the tile, or NULL */
+    int cue, flux, orthographic;  /* 1: a light's walk finds depth_cue, flux; the view is orthographic */
+    ssdgs_light_pixel *light_map; /* of the tile, or NULL */
     const ssdgs_instances *of_gaussian; /* of a light's only view, or NULL */
     const ssdgs_real *scene_depth;      /* [micro-tile][16 lanes] entries must be nearer, or NULL */
     ssdgs_real *median;          /* [micro-tile][16 lanes] where transmittance falls below 1/2, or NULL */
@@ -4011,9 +4007,9 @@ static const ssdgs__number ssdgs__render_numbers[] = {
     SSDGS__O(antialias, 'i', 0, 1, 0, 0, 0, 0),
     SSDGS__O(stop, 'r', 0, 1, 1e-4, 1.0 / 1024, 1.0 / 256, 1.0 / 64),
     SSDGS__O(alpha_threshold, 'r', 0, 1, 1.0 / 255, 1.0 / 255, 1.0 / 255, 2.0 / 255),
-    SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 16, 1.0 / 4, 1.0 / 2),
+    SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 8, 1.0 / 4, 1.0 / 2),
     SSDGS__O(light_detail, 'r', 0.01, 8, 1, 1, 0.7, 0.6),
-    SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.7, 0.6, 0.4)};
+    SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.6, 0.6, 0.4)};
 /* clang-format on */
 #undef SSDGS__O
 enum { SSDGS__RENDER_NUMBERS = sizeof ssdgs__render_numbers / sizeof *ssdgs__render_numbers };
@@ -4592,7 +4588,6 @@ static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted
     SSDGS__FOLD(key, place);
     SSDGS__FOLD(key, own->first);
     SSDGS__FOLD(key, frame->options.stop);
-    SSDGS__FOLD(key, frame->looked_up);
     SSDGS__FOLD(key, frame->bias);
     if (frame->occluder) {
         SSDGS__FOLD(key, frame->occluder->shadow);
@@ -4695,11 +4690,10 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     SSDGS__KEEP(m->seen, frame->seen, unsigned char, n);
     const size_t lit = ssdgs__times(n, (size_t)frame->light_count);
     SSDGS__KEEP(m->visibility, frame->visibility, ssdgs_real, lit);
-    int deferred = 0, all_deferred = 1, cue = 0, transport = 0;
+    int deferred = 0, cue = 0, transport = 0;
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_placed *o = frame->objects + i;
         deferred |= ssdgs__is_deferred(o);
-        all_deferred &= ssdgs__is_deferred(o) || !o->light_count;
         cue |= (o->terms & SSDGS_SCATTERING_TERM) && o->settings.depth_cue;
         transport |= ssdgs__has_transport(o);
     }
@@ -4738,7 +4732,6 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
         SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, frame->model->global_count);
     }
-    frame->looked_up = frame->options.max_error > 0 && all_deferred && !cue && ssdgs__wants_maps(frame);
     const int wanted = !ssdgs__needs_light(frame)
                            ? 0
                            : SSDGS__MADE_VISIBILITY | (ssdgs__wants_maps(frame) ? SSDGS__MADE_MAP : 0) |
@@ -5121,7 +5114,6 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     t.cx = v->cx;
     t.cy = v->cy;
     t.inverse_focal = 1 / (v->fx * v->distance);
-    t.visibility = !frame->looked_up;
     t.cue = frame->depth_cue != NULL;
     t.flux = frame->flux != NULL;
     t.orthographic = v->orthographic;
@@ -5198,55 +5190,20 @@ static void ssdgs__gather_light_task(void *data, int index) {
         }
 }
 
-/* Transmittance from a light to sixteen places in the world, rows of x, y and z, by the maps of its views in
-   turn, where passed is -1, as it stays where none knows the place. slope: rows of its gradient by the place,
-   or NULL. */
-static void ssdgs__light_transmittance(const ssdgs__kernels *k, const ssdgs_splat_view *view,
-                                       const ssdgs_splat_view *end, ssdgs_real bias, const ssdgs_real *at,
-                                       ssdgs_real *passed, ssdgs_real *slope) {
-    while (view < end && (!view->light_map || k->map_transmittance(view, bias, at, passed, slope))) view++;
-}
-
-/* The same to so many points, x y z each; 1 beside all maps. */
-static void ssdgs__points_transmittance(const ssdgs__kernels *k, const ssdgs_splat_view *view,
-                                        const ssdgs_splat_view *end, ssdgs_real bias,
-                                        const ssdgs_real *points, int count, ssdgs_real *fraction) {
-    for (int first = 0; first < count; first += 16) {
-        const int some = count - first < 16 ? count - first : 16;
-        ssdgs_real at[48], passed[16];
-        for (int i = 0; i < 16; i++) { /* the last of them fills up */
-            const ssdgs_real *from = points + 3 * (size_t)(first + (i < some ? i : some - 1));
-            for (int c = 0; c < 3; c++) at[i + 16 * c] = from[c];
-            passed[i] = -1;
-        }
-        ssdgs__light_transmittance(k, view, end, bias, at, passed, NULL);
-        for (int i = 0; i < some; i++) fraction[first + i] = passed[i] < 0 ? 1 : passed[i];
-    }
-}
-
-/* Visibility of Gaussians `which` from the light's maps, if it is looked up; what the occluder takes of it
-   and of their flux. */
-static void ssdgs__points_light(const ssdgs__gather_job *job, const int *which, const ssdgs_real *points,
-                                int count) {
-    const ssdgs_frame *frame = job->frame;
-    const size_t first = (size_t)frame->count * (size_t)job->light;
+/* Multiplies the visibility and flux of Gaussians `which` by the occluder's fractions. */
+static void ssdgs__occlude(const ssdgs_frame *frame, int light, const int *which, const ssdgs_real *points,
+                           int count) {
+    const size_t first = (size_t)frame->count * (size_t)light;
     ssdgs_real fraction[SSDGS__POINTS];
-    if (frame->looked_up)
-        ssdgs__points_transmittance(frame->context->k, frame->views + job->first_view,
-                                    frame->views + job->end_view, frame->bias[1], points, count, fraction);
-    for (int i = 0; i < count; i++) {
-        if (frame->looked_up) frame->visibility[first + (size_t)which[i]] = fraction[i];
-        fraction[i] = 1;
-    }
-    if (!count || !frame->occluder) return;
-    frame->occluder->shadow(frame->occluder->user, job->light, points, count, fraction);
+    for (int i = 0; i < count; i++) fraction[i] = 1;
+    if (count) frame->occluder->shadow(frame->occluder->user, light, points, count, fraction);
     for (int i = 0; i < count; i++) {
         frame->visibility[first + (size_t)which[i]] *= fraction[i];
         if (frame->flux) frame->flux[first + (size_t)which[i]] *= fraction[i];
     }
 }
 
-static void ssdgs__points_light_task(void *data, int index) {
+static void ssdgs__occlude_task(void *data, int index) {
     const ssdgs__gather_job *job = (const ssdgs__gather_job *)data;
     const ssdgs_frame *frame = job->frame;
     ssdgs_real points[3 * SSDGS__POINTS];
@@ -5266,11 +5223,11 @@ static void ssdgs__points_light_task(void *data, int index) {
             which[count] = o->first + i;
             count += ssdgs__finite(to[0]) && ssdgs__finite(to[1]) && ssdgs__finite(to[2]);
             if (count < SSDGS__POINTS) continue;
-            ssdgs__points_light(job, which, points, count);
+            ssdgs__occlude(frame, job->light, which, points, count);
             count = 0;
         }
     }
-    ssdgs__points_light(job, which, points, count);
+    ssdgs__occlude(frame, job->light, which, points, count);
 }
 
 static void ssdgs__gather_camera_task(void *data, int index) {
@@ -5332,8 +5289,7 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             job.end_view++;
         if (frame->views[job.first_view].cached) continue;
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
-        if (frame->occluder || frame->looked_up)
-            ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__points_light_task, &job);
+        if (frame->occluder) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__occlude_task, &job);
     }
     return SSDGS_OK;
 }
@@ -7031,6 +6987,15 @@ typedef struct ssdgs__composite_job {
     ssdgs_real *planes[4]; /* colour, transmittance */
 } ssdgs__composite_job;
 
+/* Transmittance from a light to sixteen places in the world, rows of x, y and z, by the maps of its views in
+   turn, where passed is -1, as it stays where none knows the place. slope: rows of its gradient by the place,
+   or NULL. */
+static void ssdgs__light_transmittance(const ssdgs__kernels *k, const ssdgs_splat_view *view,
+                                       const ssdgs_splat_view *end, ssdgs_real bias, const ssdgs_real *at,
+                                       ssdgs_real *passed, ssdgs_real *slope) {
+    while (view < end && (!view->light_map || k->map_transmittance(view, bias, at, passed, slope))) view++;
+}
+
 /* Where a tile keeps pixel i of 256: [micro-tile][4][16 lanes]. */
 static int ssdgs__tile_lane(int i) { return i / 16 * 64 + i % 16; }
 
@@ -7818,9 +7783,19 @@ typedef struct ssdgs__shadow_job {
 
 static void ssdgs__shadow_task(void *data, int chunk) {
     const ssdgs__shadow_job *job = (const ssdgs__shadow_job *)data;
-    const int first = chunk * SSDGS__CHUNK, left = job->count - first;
-    ssdgs__points_transmittance(job->k, job->view, job->end, job->bias, job->points + 3 * (size_t)first,
-                                left < SSDGS__CHUNK ? left : SSDGS__CHUNK, job->fraction + first);
+    const int end = job->count / SSDGS__CHUNK > chunk ? (chunk + 1) * SSDGS__CHUNK : job->count;
+    for (int first = chunk * SSDGS__CHUNK; first < end; first += 16) {
+        const int count = end - first < 16 ? end - first : 16;
+        ssdgs_real at[48], passed[16];
+        for (int i = 0; i < 16; i++) { /* the last of them fills up */
+            const ssdgs_real *from = job->points + 3 * (size_t)(first + (i < count ? i : count - 1));
+            for (int c = 0; c < 3; c++) at[i + 16 * c] = from[c];
+            passed[i] = -1;
+        }
+        ssdgs__light_transmittance(job->k, job->view, job->end, job->bias, at, passed, NULL);
+        for (int i = 0; i < count; i++)
+            job->fraction[first + i] = passed[i] < 0 ? 1 : passed[i]; /* 1: beside all objects */
+    }
 }
 
 static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
@@ -7857,8 +7832,7 @@ static ssdgs_result ssdgs__sky_shares_from(ssdgs_model *model, ssdgs__frame_memo
                                            const ssdgs_real direction[3], ssdgs_real *sky_share,
                                            ssdgs_real *sums) {
     const ssdgs_object object = ssdgs__object_alone(model);
-    ssdgs_render_options options = ssdgs_render_options_preview();
-    options.max_error = 0; /* no pixel hides what a map's centres miss */
+    const ssdgs_render_options options = ssdgs_render_options_preview();
     static const ssdgs_real even[3] = {1, 1, 1};
     const ssdgs_real along[3] = {-direction[0], -direction[1], -direction[2]};
     const ssdgs_light light = ssdgs_light_directional(along, even);
@@ -13043,8 +13017,7 @@ SSDGS__FI void F(light_map_note)(const ssdgs__tile *tile, int micro, uint64_t en
    list: `applying` multiplies entries into the transmittance and notes it after each; `sampling`, ahead of it
    by the bias, reads what was noted last before its own distance - bias.
    Micro-tiles whose pixels are all below the stop are dark: nothing is applied there any more. An entry all
-   of whose micro-tiles are dark is not sampled either, unless its Gaussian lies in other tiles too. Where
-   visibility is not asked for, none is. */
+   of whose micro-tiles are dark is not sampled either, unless its Gaussian lies in other tiles too. */
 SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     const V threshold = V_SET(tile->log2_threshold), one = V_SET(1);
     const int all = tile->flux || tile->light_map, cue = tile->cue, flux = tile->flux;
@@ -13063,10 +13036,6 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     unsigned char steps[16][16];
     memset(steps, 0, sizeof steps);
     F(batch) applied, sampled;
-    if (!tile->visibility) {
-        memset(sums, 0, tile->count * 4 * sizeof *sums);
-        sampling = tile->count;
-    }
     while (sampling < tile->count || (all && applying < tile->count)) {
         uint64_t nearer[SSDGS__BATCH]; /* per entry to sample, those of the applied ahead of it */
         int samples = 0, applies = 0;

@@ -231,7 +231,7 @@ static void test_law(const struct law *law, uint64_t step) {
                 const double error = fabs((double)out[i] - want[i]) * scale[i];
                 most = test_most(most, error);
             }
-            if (!k->finite(out, CHUNK)) most = 1e300;
+            if (!k->within(out, CHUNK, SSDGS__MOST)) most = 1e300;
             for (int i = 0; most > worst[isa] && i < CHUNK; i++)
                 if (!test_finite((double)out[i]) || fabs((double)out[i] - want[i]) * scale[i] >= most)
                     at[isa] = in[0][i];
@@ -304,7 +304,7 @@ static void test_encode(void) {
         for (int i = 0; i < BLOCK; i++) x[i] = (float)((i & 1 ? -1 : 1) * pow(10, 0.6 * i));
         x[BLOCK - 1] = from_bits(0x7F800000u);
         k->encode(code, x, NULL, 1, 1, LEVELS);
-        CHECK(k->finite(code + BLOCK, 2 * LEVELS * BLOCK));
+        CHECK(k->within(code + BLOCK, 2 * LEVELS * BLOCK, SSDGS__MOST));
         int i;
         for (i = BLOCK; i < (1 + 2 * LEVELS) * BLOCK && fabs((double)code[i]) <= 1.00001;) i++;
         CHECK(i == (1 + 2 * LEVELS) * BLOCK);
@@ -357,7 +357,7 @@ static void test_harmonics(void) {
         CHECK(dark > 10);
         for (int i = 0; i < 3 * BLOCK; i++) at[i] = eye[i / BLOCK]; /* no direction at all */
         k->harmonics(at, values, 3, eye, color);
-        CHECK(k->finite(color, 3 * BLOCK));
+        CHECK(k->within(color, 3 * BLOCK, SSDGS__MOST));
     }
     CHECK(worst < (sizeof(ssdgs_real) == 8 ? 1e-14 : 2e-6));
 }
@@ -531,7 +531,7 @@ static void test_dipole_points(void) {
                 kernel_profile(&m, r, 16, f, derivatives);
                 const double far = profile(extremes[grid], &m); /* exponents beyond 87 saturate */
                 if (!CHECK(gap((double)f[0], far) <= 1e-36 + 100 * eps * far) ||
-                    !CHECK(k->finite(derivatives, 48)))
+                    !CHECK(k->within(derivatives, 48, SSDGS__MOST)))
                     printf("    %s, %s, extreme %d: got %g, want %g\n", isa_name(), form_name[m.form], grid,
                            (double)f[0], far);
             }
@@ -723,8 +723,9 @@ static int reflect(const ssdgs__lighting *light) {
     for (int i = 0; i < BLOCK; i++) drows[SSDGS__GLOSS * BLOCK + i] = 1;
     k->reflect(light, gauss, rows);
     k->reflect_backward(light, gauss, drows, dgauss, lane_sums);
-    return k->finite(rows, SSDGS__ROWS * BLOCK) && k->finite(dgauss, SSDGS_CHANNELS * BLOCK) &&
-           k->finite(lane_sums, SSDGS__LANE_SUMS * 16);
+    return k->within(rows, SSDGS__ROWS * BLOCK, SSDGS__MOST) &&
+           k->within(dgauss, SSDGS_CHANNELS * BLOCK, SSDGS__MOST) &&
+           k->within(lane_sums, SSDGS__LANE_SUMS * 16, SSDGS__MOST);
 }
 
 /* Lobes turned at random, each moderate; p: frame and weights at random, light and eye apart. */

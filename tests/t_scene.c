@@ -1422,57 +1422,6 @@ static void test_missed(void) {
 
 /* ---- what is kept, and what is not ---- */
 
-/* With max_error above 0 the visibility of Gaussians is what the lights' maps say of their centres, where all
-   are deferred; else the sums of eq. 7. What is kept of one serves no frame of the other. */
-static void test_looked_up(void) {
-    for (int deferred = 0; deferred < 3; deferred++) { /* none, one, both */
-        ssdgs_settings s[2] = {small_settings(), small_settings()};
-        const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
-        const ssdgs_light lights[2] = {point_light(2, -2, 2), point_light(-2, -1, 1)};
-        for (int i = 0; i < 2; i++) {
-            s[i].asg = i < deferred ? SSDGS_ASG_DEFERRED : SSDGS_ASG_GEOMETRIC;
-            s[i].depth_cue = 0; /* which only the sums tell */
-        }
-        ssdgs_model *model[2] = {cloud(s, 0, 200, 0.3), cloud(s + 1, 200, 100, 0.3)};
-        const ssdgs_object object[2] = {ssdgs_object_default(model[0]),
-                                        placed(model[1], 1.2, 0.5, 0, 0.5, 0.1, 0)};
-        ssdgs_scene *own = NULL;
-        CHECK(!ssdgs_scene_create(context, &own));
-        double off[3], squares = 0;
-        for (int frame = 0; frame < 3; frame++) { /* by default, by the sums, by default */
-            ssdgs_render_options options = ssdgs_render_options_default();
-            options.max_error = frame == 1 ? 0 : options.max_error;
-            const ssdgs_image image = planes_of(shot + frame);
-            CHECK(!ssdgs_scene_light(own, object, 2, lights, 2, &options));
-            CHECK(!ssdgs_scene_render(own, object, 2, &camera, lights, 2, &options, &image, NULL));
-            off[frame] = 0;
-            for (int light = 0; light < 2; light++)
-                for (int i = 0; i < 300; i++) {
-                    const int second = i >= 200, at = second ? i - 200 + 256 : i;
-                    const ssdgs_model_view v = ssdgs_model_arrays(model[second]);
-                    ssdgs_real point[3], passed;
-                    for (int r = 0; r < 3; r++) {
-                        const ssdgs_real *row = object[second].to_world + 4 * r;
-                        point[r] = row[3];
-                        for (size_t c = 0; c < 3; c++)
-                            point[r] += row[c] * v.gaussians[c * v.stride + (size_t)(second ? i - 200 : i)];
-                    }
-                    CHECK(!ssdgs_scene_shadow(own, light, point, 1, &passed));
-                    const ssdgs_real *seen = (const ssdgs_real *)own->frame->visibility.memory;
-                    off[frame] = test_most(off[frame], fabs((double)(seen[356 * light + at] - passed)));
-                }
-        }
-        for (int i = 0; i < SIDE * SIDE * 3; i++)
-            squares += pow((double)(shot[0].value[i] - shot[1].value[i]), 2) / (SIDE * SIDE * 3);
-        CHECK(same(shot, shot + 2));
-        CHECK(off[1] > 0.05 && (deferred == 2 ? off[0] < 1e-4 && off[2] < 1e-4 : off[0] >= off[1]));
-        CHECK(deferred < 2 || (squares > 0 && squares < 1e-5));
-        if (deferred == 2) printf("visibility looked up: %.1f dB to the sums\n", -10 * log10(squares));
-        ssdgs_scene_destroy(own);
-        for (int i = 0; i < 2; i++) ssdgs_model_destroy(model[i]);
-    }
-}
-
 static void test_kept(void) {
     ssdgs_settings s = small_settings();
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
@@ -2004,7 +1953,6 @@ int main(void) {
     test_left_handed();
     test_missed();
     test_anything();
-    test_looked_up();
     test_kept();
     test_flicker();
     TEST_ROW("94", "objects out of sight", test_out_of_sight());

@@ -531,8 +531,7 @@ static void test_lights(void) {
         for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(color[i]);
         CHECK(finite);
         ssdgs_frame frame;
-        const ssdgs_render_options exact = ssdgs_render_options_exact();
-        CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, &light, 1, &exact, 0, 0));
+        CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, &light, 1, NULL, 0, 0));
         CHECK(!ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK));
         CHECK(frame.view_count == (distance < 1 ? 7 : 2));
         for (int i = 0; i < 300; i++) {
