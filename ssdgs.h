@@ -544,7 +544,7 @@ typedef struct ssdgs_render_options {
    what of an even sky its own model leaves it, which is found anew after each change of the model. Shadows do
    not change it; image.scattering has it. */
 
-/* For games (max_error 1/8, stop 1/1024, transport_detail 0.6), the method as written, for speed (max_error
+/* For games (max_error 1/16, stop 1/1024, transport_detail 0.6), the method as written, for speed (max_error
    1/4, stop 1/256, light_detail 0.7, transport_detail 0.6) and for previews (max_error 1/2, stop 1/64,
    light_detail 0.6, transport_detail 0.4, alpha_threshold 2/255). SPEED in the manual says what they lose. */
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
@@ -4007,7 +4007,7 @@ static const ssdgs__number ssdgs__render_numbers[] = {
     SSDGS__O(antialias, 'i', 0, 1, 0, 0, 0, 0),
     SSDGS__O(stop, 'r', 0, 1, 1e-4, 1.0 / 1024, 1.0 / 256, 1.0 / 64),
     SSDGS__O(alpha_threshold, 'r', 0, 1, 1.0 / 255, 1.0 / 255, 1.0 / 255, 2.0 / 255),
-    SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 8, 1.0 / 4, 1.0 / 2),
+    SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 16, 1.0 / 4, 1.0 / 2),
     SSDGS__O(light_detail, 'r', 0.01, 8, 1, 1, 0.7, 0.6),
     SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.6, 0.6, 0.4)};
 /* clang-format on */
