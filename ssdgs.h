@@ -13150,6 +13150,8 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
     if (tile->light_map) ssdgs__light_map_end(tile, steps[0], transmittance[0]);
 }
 
+/* ==== >>map_kernels  where pixels are, and what a light's map leaves of light there ==== */
+
 /* Where a micro-tile's pixels are in the world, rows of x, y and z, by their depth layer, and the camera's
    rays (x, y, 1) through them, rows of x and y. Where asked is not below 0 they stand at the eye. */
 SSDGS__FN void F(places)(const ssdgs__lighting *k, const ssdgs__tile *tile, int micro, const R *depth,
