@@ -1061,13 +1061,15 @@ typedef struct ssdgs_frame {
     /* SSDGS_STAGE_COMPOSITE */
     ssdgs_real *pixels;            /* (3, h, w) without background */
     ssdgs_real *layer_pixels;      /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
-                                      nothing is; for components and training */
+                                      nothing is; for components. In training, where pixel_shadow is NULL, it
+                                      is (2, 3, h, w): camera depth, F0, 1; normal */
     ssdgs_real *transmittance;     /* (h, w) */
     ssdgs_real *median_depth;      /* (h, w) as in ssdgs_image; NULL: not asked for */
     const ssdgs_real *scene_depth; /* (h, stride) as in ssdgs_image; for WALK and COMPOSITE */
     int stride;
     ssdgs_real *pixel_visibility,
-        *pixel_shadow;              /* (lights, h, w) v, S where light is deferred; as layer_pixels */
+        *pixel_shadow; /* (lights, h, w) v, S where light is deferred; for components. In training v is there
+                          for visibility_given alone */
     const ssdgs_occluder *occluder; /* NULL: none; for WALK and COMPOSITE */
     int maps;                       /* 1: light maps are asked for, whoever needs them */
     int visibility_given; /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other
@@ -4707,11 +4709,11 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         SSDGS__RESERVE(w->layers, frame->layers, ssdgs_real, layers);
         if (components || training) {
             const size_t lit_pixels = ssdgs__times(pixels, (size_t)frame->light_count);
-            SSDGS__RESERVE(w->layer_pixels, frame->layer_pixels, ssdgs_real,
-                           ssdgs__times(pixels * 3, components ? (size_t)frame->layer_count + 1
-                                                               : (size_t)SSDGS__LIGHT_LAYER));
             SSDGS__RESERVE(w->pixel_visibility, frame->pixel_visibility, ssdgs_real, lit_pixels);
             if (components) SSDGS__RESERVE(w->pixel_shadow, frame->pixel_shadow, ssdgs_real, lit_pixels);
+            const int kept = components ? frame->layer_count + 1 : SSDGS__LIGHT_LAYER - SSDGS__DEPTH_LAYER;
+            SSDGS__RESERVE(w->layer_pixels, frame->layer_pixels, ssdgs_real,
+                           ssdgs__times(pixels * 3, (size_t)kept));
         }
         if (training) SSDGS__RESERVE(w->layer_gradient, frame->layer_gradient, ssdgs_real, layers);
     }
@@ -6094,6 +6096,7 @@ static unsigned ssdgs__fours(const size_t from[SSDGS__BLOCK]) {
     return fours;
 }
 
+/* A plane's values at a block's lanes. */
 static void ssdgs__gather(const ssdgs_real *plane, const size_t from[SSDGS__BLOCK], unsigned fours,
                           ssdgs_real *row) {
     for (int s = 0; s < SSDGS__BLOCK; s += 4, fours >>= 1)
@@ -6401,12 +6404,12 @@ SSDGS__SMALL_END
 /* The colours that no light makes, as they are seen from the eye: stored values, decoded where the frame
    blends linear light, unless a baked model has linear ones. */
 static void ssdgs__kept(const ssdgs_frame *frame, const ssdgs_placed *o, const size_t own[SSDGS__BLOCK],
-                        const ssdgs_real *position, ssdgs_real *rows, ssdgs_real *kept) {
+                        unsigned fours, const ssdgs_real *position, ssdgs_real *rows, ssdgs_real *kept) {
     const ssdgs__kernels *k = frame->context->k;
     const int first = ssdgs__kept_plane(&o->settings);
     for (int c = first; c < o->gaussians.channels; c++) {
         const ssdgs_real *plane = o->gaussians.gaussians + (size_t)c * o->gaussians.stride;
-        ssdgs__gather(plane, own, ssdgs__fours(own), rows + (c - first) * SSDGS__BLOCK);
+        ssdgs__gather(plane, own, fours, rows + (c - first) * SSDGS__BLOCK);
     }
     k->harmonics(position, rows, o->settings.harmonics, ssdgs__lightings(frame, o)->eye, kept);
     if (frame->settings.transfer == SSDGS_TRANSFER_SRGB &&
@@ -6432,8 +6435,8 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         sums[s] = at[s] / SSDGS__BLOCK * SSDGS__LENGTHS * SSDGS__BLOCK + at[s] % SSDGS__BLOCK;
     }
     const unsigned fours = ssdgs__fours(at), sums_fours = ssdgs__fours(sums);
-    const ssdgs_real most = (ssdgs_real)1e30; /* in layers: products with lobes must be finite */
-    int sound = 1;                            /* none has more */
+    const ssdgs_real most = (ssdgs_real)1e30; /* of a layer's values: products with lobes must be finite */
+    int sound = 1;                            /* they are all within it: no need to look at each */
     const int bare = settings->baked && !o->light_count && !frame->layer_count &&
                      !frame->diffuse; /* needs a colour alone */
     for (int i = 0; i < (bare ? SSDGS_ROTATION : SSDGS_CHANNELS); i++) {
@@ -6446,7 +6449,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     memset(outs, 0, SSDGS__OUTS * SSDGS__BLOCK * sizeof *outs);
     ssdgs_real factors[4 * SSDGS__BLOCK], rest[SSDGS__BLOCK], *kept = scratch + l->kept;
     const int edited = ssdgs__object_factors(frame, o, at, gauss, factors);
-    if (o->kept > 0) ssdgs__kept(frame, o, own, gauss, scratch + l->harmonics, kept);
+    if (o->kept > 0) ssdgs__kept(frame, o, own, fours, gauss, scratch + l->harmonics, kept);
     for (int s = 0; s < SSDGS__BLOCK; s++) rest[s] = 1; /* what of it no light takes for its own */
     const int medium = ssdgs__has_medium(settings, o->terms);
     if (frame->layer_count) k->lobe(gauss, scratch + l->lobe);
@@ -6493,7 +6496,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             ssdgs_real *to =
                 part + l->transport + i * SSDGS__BLOCK; /* in units of the irradiance of its own */
             const ssdgs_real *cosine = part + l->rows + SSDGS__COSINE * SSDGS__BLOCK,
-                             even = (ssdgs_real)ssdgs__beneath_plane(i);
+                             even = casts ? 0 : (ssdgs_real)ssdgs__beneath_plane(i);
             const size_t first = (blocks * (size_t)light * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK;
             if (casts) ssdgs__gather(job->transport + first, sums, sums_fours, to);
             for (int s = 0; s < SSDGS__BLOCK; s++)
@@ -6967,10 +6970,14 @@ static void ssdgs__tile_load(const ssdgs__tile *tile, const ssdgs_real *plane, i
         }
 }
 
-/* Blended, layer 0 is the colour. */
+/* The first of the blended layers that are kept: all, or in training the depth's and the normals'. */
+static int ssdgs__first_kept(const ssdgs_frame *frame) {
+    return frame->pixel_shadow ? SSDGS__COLOUR_LAYER : SSDGS__DEPTH_LAYER;
+}
+
 static ssdgs_real *ssdgs__layer_plane(const ssdgs_frame *frame, int layer, int c) {
-    return frame->layer_pixels +
-           (size_t)frame->camera.width * (size_t)frame->camera.height * (size_t)(3 * layer + c);
+    return frame->layer_pixels + (size_t)frame->camera.width * (size_t)frame->camera.height *
+                                     (size_t)(3 * (layer - ssdgs__first_kept(frame)) + c);
 }
 
 static void ssdgs__layer_pixels_store(const ssdgs_frame *frame, const ssdgs__tile *tile, int layer, int add,
@@ -6996,11 +7003,8 @@ static void ssdgs__light_transmittance(const ssdgs__kernels *k, const ssdgs_spla
     while (view < end && (!view->light_map || k->map_transmittance(view, bias, at, passed, slope))) view++;
 }
 
-/* Where a tile keeps pixel i of 256: [micro-tile][4][16 lanes]. */
-static int ssdgs__tile_lane(int i) { return i / 16 * 64 + i % 16; }
-
 /* Transmittance from a light to the places of a micro-tile's pixels, by their depth layer, where passed is
-   -1. Also the camera's rays and the places, of `places`. */
+   -1. ray, at: what the kernel `places` finds on its way. */
 static void ssdgs__places_transmittance(const ssdgs_frame *frame, const ssdgs__lighting *lighting, int light,
                                         const ssdgs__tile *tile, int micro, const ssdgs_real *depth,
                                         ssdgs_real *passed, ssdgs_real *ray, ssdgs_real *at,
@@ -7069,7 +7073,7 @@ static void ssdgs__join_shadows(const ssdgs_frame *frame, const ssdgs__tile *til
         ssdgs__tile_load(tile, ssdgs__layer_plane(frame, SSDGS__DIFFUSE_LAYER + SSDGS__PER_LIGHT * light, c),
                          c, others);
     for (int i = 0; i < 256; i++) {
-        const int at = ssdgs__tile_lane(i);
+        const int at = i / 16 * 64 + i % 16;                            /* [micro-tile][4][16 lanes] */
         const ssdgs_real cover = depth[at + 32], all = before[at + 32]; /* has this one's cover already */
         const ssdgs_real share = all > SSDGS__THIN ? cover / all : 1, shadow = visibility[at + 16];
         for (int j = 0; j < 2; j++) {
@@ -7083,7 +7087,7 @@ static void ssdgs__join_shadows(const ssdgs_frame *frame, const ssdgs__tile *til
     }
 }
 
-/* Lights the pixels of a tile by one light; with layer_pixels, keeps what it found. later: other materials
+/* Lights the pixels of a tile by one light; with pixel_shadow, keeps what it found. later: other materials
    have been here. */
 static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile, int light, int later,
                               ssdgs_real *pixels) {
@@ -7144,7 +7148,7 @@ static void ssdgs__composite_task(void *data, int index) {
     ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int layer = 0; layer < layers; layer++)
         color[layer] = layer ? ssdgs__layer(frame, layer) : job->color;
-    for (int y = tile.y; y < tile.y + 16 && y < tile.height; y++) /* else storing would wait for memory */
+    for (int y = tile.y; y < tile.y + 16 && y < tile.height; y++) /* to be near once it is stored */
         for (int c = 0; c < 4; c++)
             SSDGS__PREFETCH(job->planes[c] + (size_t)y * (size_t)tile.width + (size_t)tile.x);
     ssdgs_real scene_depth[256], median[256];
@@ -7161,8 +7165,7 @@ static void ssdgs__composite_task(void *data, int index) {
         tile.median = NULL;
         if (frame->layer_count && layers == 1)
             memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
-        for (int layer = frame->pixel_shadow ? 0 : SSDGS__DEPTH_LAYER;
-             frame->layer_count && layer < SSDGS__LIGHT_LAYER; layer++)
+        for (int layer = ssdgs__first_kept(frame); frame->layer_count && layer < SSDGS__LIGHT_LAYER; layer++)
             ssdgs__layer_pixels_store(frame, &tile, layer, later, pixels + layer * SSDGS__TILE_LAYER);
         for (int light = 0; frame->layer_count && light < frame->light_count; light++)
             if (frame->pixel_shadow || ssdgs__reaches_tile(frame, &tile, light))
@@ -7270,7 +7273,8 @@ static void ssdgs__composite_backward_task(void *data, int index) {
     ssdgs_real gradient[SSDGS__LAYERS * SSDGS__TILE_LAYER];
     for (int c = 0; c < 4; c++)
         ssdgs__tile_load(&tile, frame->pixel_gradient + plane * (size_t)c, c, gradient);
-    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER]; /* as the forward's, which would fill memory */
+    ssdgs_real pixels[SSDGS__LAYERS * SSDGS__TILE_LAYER]; /* blended again: to keep them takes memory and more
+                                                             time */
     const ssdgs_real *color[SSDGS__LAYERS];
     for (int layer = 0; layer < layers; layer++) color[layer] = ssdgs__layer(frame, layer);
     k->composite(&tile, layers, color, pixels);
@@ -12266,13 +12270,13 @@ SSDGS__FI void F(columns8)(const R *rows, R (*column)[SSDGS__VW]) {
 
 /* ==== >>vmath  elementary functions on V, the transfer curve ==== */
 
+/* The kernels call them; the host calls their scalar forms. */
+
 /* The greatest whole number up to x >= 0. */
 SSDGS__FI V F(floor)(V x) {
     const V whole = V_ROUND(x);
     return V_SEL(V_LT(x, whole), V_SUB(whole, V_SET(1)), whole);
 }
-
-/* The kernels call them; the host calls their scalar forms. */
 
 #ifdef SSDGS_REAL64
 SSDGS__FI V F(exp)(V x) { return exp(V_MIN(700.0, x)); }
@@ -12992,6 +12996,7 @@ SSDGS__FI unsigned F(below)(const R *transmittance, const R *next) {
    before any entry, row index + 1 after that entry. */
 SSDGS__FI void F(light_map_note)(const ssdgs__tile *tile, int micro, uint64_t entries, R (*after)[16],
                                  const R *distance, R *next, unsigned char *level) {
+    if (!F(below)(after[ssdgs__highest_bit(entries << 1)], next)) return; /* not after the last either */
     for (int before = 0; entries; entries &= entries - 1) {
         const int index = ssdgs__lowest_bit(entries);
         for (unsigned fell = F(below)(after[index + 1], next); fell; fell &= fell - 1) {
@@ -13112,8 +13117,7 @@ SSDGS__FN void F(walk_light)(const ssdgs__tile *tile, R *sums) {
                     }
                 }
             }
-            if (F(below)(history[0][ssdgs__highest_bit(entries << 1)], next[micro])) F(light_map_note)
-            (tile, micro, entries, history[0], applied.distance, next[micro], steps[micro]);
+            F(light_map_note)(tile, micro, entries, history[0], applied.distance, next[micro], steps[micro]);
             for (uint64_t left = sampled.entries[micro]; left; left &= left - 1) {
                 const int index = ssdgs__lowest_bit(left),
                           then = ssdgs__highest_bit((entries & nearer[index]) << 1);
@@ -13216,7 +13220,7 @@ SSDGS__FN int F(map_transmittance)(const ssdgs_splat_view *map, R bias, const R 
                                 V_AND(V_LT(V_SET(map->near_plane), t[2]), V_LT(before, zero)));
         const V xx_yy = V_ADD(V_MUL(t[0], t[0]), V_MUL(t[1], t[1]));
         const V far_off = map->by_distance ? V_SQRT(V_ADD(xx_yy, V_MUL(t[2], t[2]))) : t[2];
-        const V nearest = V_ADD(V_ADD(thick, V_MUL(tiny, far_off)), V_SET(map->nearest));
+        const V distance = V_SUB(far_off, V_ADD(V_ADD(thick, V_MUL(tiny, far_off)), V_SET(map->nearest)));
         if (!V_BITS(inside)) {
             unknown |= V_BITS(V_LT(before, zero));
             continue;
@@ -13241,8 +13245,7 @@ SSDGS__FN int F(map_transmittance)(const ssdgs_splat_view *map, R bias, const R 
                 pixel[i] = tile == UINT32_MAX ? open : map->light_map[(size_t)tile * 256 + (size_t)of_tile];
             }
             F(columns8)((const R *)(const void *)pixel, column);
-            found[corner] =
-                F(pixel_transmittance)(column, V_SUB(far_off, nearest), thick, slope ? steep + corner : NULL);
+            found[corner] = F(pixel_transmittance)(column, distance, thick, slope ? steep + corner : NULL);
         }
         const V not_u = V_SUB(one, u), not_w = V_SUB(one, w);
         const V upper = V_ADD(V_MUL(not_u, found[0]), V_MUL(u, found[1]));

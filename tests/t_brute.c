@@ -1544,7 +1544,7 @@ static int depth_normal(const double *depth, int width, int x, int y, double n[3
 
 static void test_normals(void) {
     enum { WIDTH = 53, HEIGHT = 37, SIZE = WIDTH * HEIGHT };
-    static ssdgs_real layers[7 * 3 * SIZE];
+    static ssdgs_real layers[2 * 3 * SIZE]; /* the depth's and the normals' */
     static double depth[SIZE];
     double most = 0, weight = 0.7 / SIZE;
     int told = 0, flat = 0;
@@ -1558,11 +1558,9 @@ static void test_normals(void) {
             const double v = (i / WIDTH + 0.5 - (double)s.camera.cy) / (double)s.camera.fy;
             const double alpha = uniform(0, 1) < 0.05 ? uniform(0, 0.49) : uniform(0.51, 1);
             const double d = index < 10 ? 1.5 / (plane[0] * u + plane[1] * v + 1) : uniform(1, 1.5);
-            layers[3 * 3 * SIZE + i] = (ssdgs_real)(alpha * d);
-            layers[3 * 3 * SIZE + 2 * SIZE + i] = (ssdgs_real)alpha;
-            depth[i] = alpha < 0.5
-                           ? 0
-                           : (double)layers[3 * 3 * SIZE + i] / (double)layers[3 * 3 * SIZE + 2 * SIZE + i];
+            layers[i] = (ssdgs_real)(alpha * d);
+            layers[2 * SIZE + i] = (ssdgs_real)alpha;
+            depth[i] = alpha < 0.5 ? 0 : (double)layers[i] / (double)layers[2 * SIZE + i];
         }
         normalise(plane);
         for (int isa = 0; isa < SSDGS_ISA_COUNT; isa++)

@@ -470,19 +470,21 @@ static void test_empty_tiles(void) {
     const ssdgs_render_options options = ssdgs_render_options_exact();
     ssdgs_light light;
     ssdgs_model *model = NULL;
-    int blended = 0, left = 0;
     memset(&light, 0, sizeof light);
     light.position[0] = light.intensity[0] = light.intensity[1] = light.intensity[2] = 2;
     if (!CHECK(!ssdgs_model_create(context, &settings, 1, &model))) exit(1);
     for (size_t i = 0; i < 3; i++) model->gaussians[(SSDGS_LOG_SCALE + i) * model->capacity] = -4;
-    ssdgs_frame frame;
-    if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, 1, 0)) exit(1);
-    const size_t count = (size_t)(3 * (1 + frame.layer_count)) * WIDE * WIDE;
-    for (size_t i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
-    if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE)) exit(1);
-    for (size_t i = 0; i < count; i++)
-        left += frame.layer_pixels[i] == 0.7, blended += frame.layer_pixels[i] > 0;
-    CHECK(!left && blended > 0 && blended < (int)count / 4);
+    for (int training = 0; training < 2; training++) { /* which keeps two layers */
+        ssdgs_frame frame;
+        int blended = 0, left = 0;
+        if (ssdgs__frame_of_model(&frame, model, &camera, &light, 1, &options, !training, training)) exit(1);
+        const size_t count = (size_t)(3 * (training ? 2 : 1 + frame.layer_count)) * WIDE * WIDE;
+        for (size_t i = 0; i < count; i++) frame.layer_pixels[i] = 0.7;
+        if (ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE)) exit(1);
+        for (size_t i = 0; i < count; i++)
+            left += frame.layer_pixels[i] == 0.7, blended += frame.layer_pixels[i] > 0;
+        CHECK(!left && blended > 0 && blended < (int)count / 4);
+    }
     ssdgs_model_destroy(model);
 }
 

@@ -86,8 +86,7 @@ static void find_arrays(device *d, ssdgs_frame *f, int stage) {
     if (stage >= SSDGS_STAGE_COMPOSITE) {
         ADD(f->pixels, 3 * pixels, 0);
         ADD(f->transmittance, pixels, 0);
-        ADD(f->layer_pixels, 3 * pixels * (size_t)(f->pixel_shadow ? 1 + f->layer_count : SSDGS__LIGHT_LAYER),
-            0);
+        ADD(f->layer_pixels, 3 * pixels * (size_t)(f->pixel_shadow ? 1 + f->layer_count : 2), 0);
         ADD(f->pixel_visibility, pixels * lights, 0);
         ADD(f->pixel_shadow, pixels * lights, 0);
         ADD(f->median_depth, pixels, 0);
