@@ -727,8 +727,8 @@ typedef struct ssdgs_train_options {
                               1 */
     int initial_points;    /* random Gaussians in the bounds when the model is empty, no more than density
                               control makes; 10000 */
-    int max_gaussians;     /* density control stops here; 0: at three quarters of the pixels that a photograph
-                              shows, on average, but from 2,000 to 100,000; 0 */
+    int max_gaussians;     /* density control ends with no more; 0: than three eighths of the pixels that a
+                              photograph shows, on average, but 1,000 to 50,000; 0 */
     int densify_every;     /* 1 and up: iterations between two rounds of density control; 100 */
     int densify_from;      /* first round; 200 */
     int densify_until;     /* last round; 50000* */
@@ -742,6 +742,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
     ssdgs_real bounds_max[3];    /* 0.5 */
     ssdgs_real densify_gradient; /* half images: a Gaussian pulled as hard is cloned or split; 0: all; 4e-4 */
+    ssdgs_real surplus; /* 1 and up: density control makes so many times max_gaussians at first. From 18000*
+                           to 36000* those go that give least to the photographs; 2 */
     /* A Gaussian is removed if more than this share of the photographs that see its centre show background
        there, or if none sees it; 0.02. Photographs should be transparent where the object is not. One has an
        outline if more than 1 % of its pixels, but not all, have alpha 0. Of eight outlines or more those that
@@ -9573,7 +9575,7 @@ struct ssdgs_trainer {
     ssdgs_real *contribution;
     ssdgs_real *sky_share; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
     double extent;         /* 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
-    int budget;            /* density control makes no more Gaussians */
+    int budget;            /* density control ends with no more Gaussians */
     int backdrop,
         opaque_everywhere; /* no outlines, but options.background around it; or surfaces, everywhere */
     int one_light;         /* photographs do not tell how the object looks in other light */
@@ -9613,6 +9615,7 @@ static const ssdgs__number ssdgs__train_numbers[] = {
     SSDGS__O(bounds_min, 3, 'r', -1e30, 1e30, -0.5, -0.5),
     SSDGS__O(bounds_max, 3, 'r', -1e30, 1e30, 0.5, 0.5),
     SSDGS__O(densify_gradient, 0, 'r', 0, 1e30, 4e-4, 2e-4),
+    SSDGS__O(surplus, 0, 'r', 1, 100, 2, 1),
     SSDGS__O(prune_outside, 0, 'r', 0, 1, 0.02, 0),
     SSDGS__O(adam_epsilon, 0, 'r', 0, 1e30, 0.1, 0),
     SSDGS__O(finish, 0, 'r', 0, 1, 0.3, 1),
@@ -10311,7 +10314,9 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 /* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by steps. */
 
 #define SSDGS__STATISTICS 3
-#define SSDGS__PER_PIXEL 0.75  /* more Gaussians than that take time and show nothing */
+#define SSDGS__PER_PIXEL 0.375 /* more Gaussians than that take time and show nothing */
+#define SSDGS__FULL 0.36       /* of densify_until: so long there may be options.surplus times as many */
+#define SSDGS__LEAN 0.72       /* and from here on no more than the budget */
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
 #define SSDGS__FAINT 0.005     /* opacity below which a Gaussian is removed */
 #define SSDGS__FADE 0.8        /* px: what an opaque Gaussian costs where photographs show `background` */
@@ -10520,11 +10525,22 @@ static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char 
     return SSDGS_OK;
 }
 
+/* So many Gaussians may there be until the next round of density control. */
+static size_t ssdgs__allowed(const ssdgs_trainer *trainer) {
+    const ssdgs_train_options *o = &trainer->options;
+    const double t = ssdgs__schedule_time(o, trainer->run.iteration + o->densify_every) / o->densify_until;
+    const double left = t < SSDGS__FULL   ? 1
+                        : t < SSDGS__LEAN ? (SSDGS__LEAN - t) / (SSDGS__LEAN - SSDGS__FULL)
+                                          : 0;
+    const double most = trainer->budget * (1 + left * ((double)o->surplus - 1));
+    return most < SSDGS__MAX_GAUSSIANS ? (size_t)(most + 0.5) : SSDGS__MAX_GAUSSIANS;
+}
+
 static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     ssdgs_context *context = trainer->context;
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    const size_t n = (size_t)model->count;
+    const size_t n = (size_t)model->count, allowed = ssdgs__allowed(trainer);
     const double largest =
         log(0.1 * trainer->extent > 2 * trainer->run.start_size ? 0.1 * trainer->extent
                                                                 : 2 * trainer->run.start_size);
@@ -10561,12 +10577,12 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         dropped--;
     }
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
-    size_t room = (size_t)trainer->budget > n - dropped ? (size_t)trainer->budget - (n - dropped) : 0;
-    if (wanted > room || n - dropped > (size_t)trainer->budget) {
+    size_t room = allowed > n - dropped ? allowed - (n - dropped) : 0;
+    if (wanted > room || n - dropped > allowed) {
         /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
            at a time */
         ssdgs__ranked *least = candidates + n;
-        const size_t over = n - dropped > (size_t)trainer->budget ? n - dropped - (size_t)trainer->budget : 0;
+        const size_t over = n - dropped > allowed ? n - dropped - allowed : 0;
         const size_t more = wanted > room ? wanted - room : 0;
         size_t spare = over + (recovering ? 0 : more < n / 20 ? more : n / 20), m = 0;
         for (size_t i = 0; i < n; i++)
@@ -10744,7 +10760,8 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
     enum { rounds = 16, least = 4 }; /* more than one in so many is left, or so many rounds are drawn */
     ssdgs_model *model = trainer->model;
     const ssdgs_train_options *o = &trainer->options;
-    const size_t n = (size_t)(o->initial_points < trainer->budget ? o->initial_points : trainer->budget);
+    const size_t allowed = ssdgs__allowed(trainer);
+    const size_t n = (size_t)o->initial_points < allowed ? (size_t)o->initial_points : allowed;
     double volume = 1;
     size_t kept = 0;
     if (o->initial_points < 1)
@@ -11036,9 +11053,9 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
     }
     const double most = SSDGS__PER_PIXEL * shown;
     trainer->budget = o->max_gaussians ? o->max_gaussians
-                      : most < 2000    ? 2000
-                      : most < 100000  ? (int)most
-                                       : 100000;
+                      : most < 1000    ? 1000
+                      : most < 50000   ? (int)most
+                                       : 50000;
     result = ssdgs__doubt_outlines(trainer);
     if (result) return result;
     for (int i = 0; i < photo_count; i++) outlined += trainer->transparent[i] == 2;

@@ -149,6 +149,7 @@ static void test_set(void) {
                      {"dssim", &o->dssim, 1, 1},
                      {"normal_weight", &o->normal_weight, 1, 1},
                      {"densify_gradient", &o->densify_gradient, 1, 1},
+                     {"surplus", &o->surplus, 1, 1},
                      {"prune_outside", &o->prune_outside, 1, 1},
                      {"adam_epsilon", &o->adam_epsilon, 1, 1},
                      {"finish", &o->finish, 1, 1},

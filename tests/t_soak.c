@@ -524,9 +524,9 @@ static void row_59(void) {
         for (int i = 0; i < o.iterations; i++) {
             steps(&t, 1);
             most = t.model->count > most ? t.model->count : most;
-            CHECK(t.model->count <= o.max_gaussians);
+            CHECK(t.model->count <= (int)o.surplus * o.max_gaussians);
         }
-        CHECK(most > o.max_gaussians * 3 / 4 && ALL_FINITE(t.model));
+        CHECK(most > o.max_gaussians && t.model->count <= o.max_gaussians && ALL_FINITE(t.model));
         printf("    %d Gaussians of %d, %lu bytes at most\n", most, o.max_gaussians, (unsigned long)m.peak);
         finish(&t);
         CHECK(m.live == 0);
