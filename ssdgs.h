@@ -536,6 +536,7 @@ typedef struct ssdgs_render_options {
     ssdgs_real max_error;    /* 0 .. 1: Gaussians whose weights sum to less in every pixel are not shaded */
     ssdgs_real light_detail; /* 0.01 .. 8: resolution of the light maps; 1 = the model's choice */
     ssdgs_real transport_detail; /* 0.1 .. 8: accuracy of true dipole transport; 1 = 1 % off at most, about */
+    ssdgs_real level_detail;     /* 0 .. 8: of an object with levels, see ssdgs_object; 0: its model itself */
     ssdgs_real ambient[9][3];    /* RGB, light from all around: see below; 0 = none */
 } ssdgs_render_options;
 /* ambient: the irradiance on a surface with the world's normal x y z is the sum of ambient[0] .. [8] times 1,
@@ -592,9 +593,16 @@ typedef struct ssdgs_object {
     ssdgs_real translucency; /* 0.1 .. 10: factor of how far light travels in it, by true transport; 1 */
     ssdgs_real kept;         /* 0 or more: factor of its baked colours, which it sends without any light;
                                 settings.kept, 1 of what is baked */
-    const unsigned char *mask; /* (Gaussians of the model) 255: takes tint, roughness and specular whole; 0:
-                                  stays as it is. Geometric lobes take roughness whole. Read in the call.
-                                  NULL: all do; NULL */
+    const unsigned char *mask;  /* (Gaussians of the model) 255: takes tint, roughness and specular whole; 0:
+                                   stays as it is. Geometric lobes take roughness whole. Read in the call.
+                                   NULL: all do; NULL */
+    ssdgs_real presence;        /* 0 .. 1: share of its optical depth that is there: fades it in and out; 1 */
+    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, from one to the next
+                                   a fifth less or more. A frame draws the least one that still has 3 for 8
+                                   pixels of the object's box x options.level_detail, or up to a quarter above
+                                   that two which fade into each other. An object with a mask stays as it is.
+                                   Read in the call; NULL */
+    int level_count;
 } ssdgs_object;
 /* A model as it was trained, where its settings.placement puts it. */
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model);
@@ -1008,7 +1016,7 @@ typedef struct ssdgs_placed {
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
     uint64_t key;             /* of revision, first, rotation, scale and offset: equal where these are */
     double middle[3], radius; /* world: a ball around what it draws; no use with one object alone */
-    ssdgs_real tint[3], roughness, specular, translucency, kept;
+    ssdgs_real tint[3], roughness, specular, translucency, kept, presence;
     ssdgs_real medium[15];       /* RGB weights of true transport's lengths, where a medium scatters */
     const unsigned char *mask;   /* as in ssdgs_object */
     int material;                /* pixels blend and light the layers of each material by themselves */
@@ -1378,7 +1386,7 @@ enum {
 /* ---- what the kernels are called with ---- */
 
 typedef struct ssdgs__projection {
-    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold, variance, depth_scale;
+    ssdgs_real view[12], fx, fy, cx, cy, near_plane, log2_threshold, variance, depth_scale, presence;
     int width, height, orthographic, by_distance, compensate, blur;
 } ssdgs__projection;
 
@@ -3618,11 +3626,25 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
         SSDGS__REFUSE(!(o->roughness >= (ssdgs_real)0.1 && o->roughness <= 10) ||
                           !(o->translucency >= (ssdgs_real)0.1 && o->translucency <= 10) ||
                           !(o->specular >= 0 && o->specular <= (ssdgs_real)1e6) ||
-                          !(o->kept >= 0 && o->kept <= (ssdgs_real)1e6),
-                      "object %d: roughness = %g, specular = %g, translucency = %g, kept = %g, where "
-                      "0.1 .. 10, 0 .. 1e6, 0.1 .. 10 and 0 .. 1e6 are allowed; ssdgs_object_default() sets "
-                      "them",
-                      i, (double)o->roughness, (double)o->specular, (double)o->translucency, (double)o->kept);
+                          !(o->kept >= 0 && o->kept <= (ssdgs_real)1e6) ||
+                          !(o->presence >= 0 && o->presence <= 1),
+                      "object %d: roughness = %g, specular = %g, translucency = %g, kept = %g, presence = "
+                      "%g, where 0.1 .. 10, 0 .. 1e6, 0.1 .. 10, 0 .. 1e6 and 0 .. 1 are allowed; "
+                      "ssdgs_object_default() sets them",
+                      i, (double)o->roughness, (double)o->specular, (double)o->translucency, (double)o->kept,
+                      (double)o->presence);
+        SSDGS__REFUSE(o->level_count < 0 || (o->level_count && !o->levels), "object %d: %d levels at %s", i,
+                      o->level_count, o->levels ? "an array" : "NULL");
+        for (int j = 0; j < o->level_count; j++) {
+            const ssdgs_model *level = o->levels[j], *before = j ? o->levels[j - 1] : o->model;
+            SSDGS__REFUSE(!level || level->context != context ||
+                              level->settings.transfer != o->model->settings.transfer ||
+                              level->settings.baked != o->model->settings.baked,
+                          "object %d: level %d is not of its model's context, transfer or kind", i, j);
+            SSDGS__REFUSE(5 * (int64_t)level->count > 4 * (int64_t)before->count,
+                          "object %d: level %d has %d Gaussians, over four fifths of the %d before it", i, j,
+                          level->count, before->count);
+        }
         if (!o->model->settings.baked) {
             SSDGS__REFUSE(first && first->settings.transfer != o->model->settings.transfer,
                           "object %d: its settings.transfer is not that of the objects before it", i);
@@ -3768,7 +3790,7 @@ static ssdgs_object ssdgs__object_alone(ssdgs_model *model) {
     memset(&object, 0, sizeof object);
     object.model = model;
     for (int i = 0; i < 3; i++) object.to_world[5 * i] = object.tint[i] = 1;
-    object.roughness = object.specular = object.translucency = 1;
+    object.roughness = object.specular = object.translucency = object.presence = 1;
     if (model) object.kept = model->settings.baked ? 1 : model->settings.kept;
     return object;
 }
@@ -4002,6 +4024,8 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
 
 /* Presets and their checks, and what settings and options ask of a frame. */
 
+#define SSDGS__PER_PIXEL 0.375 /* more Gaussians than that take time and show nothing */
+
 /* clang-format off */
 #define SSDGS__O(member, type, low, high, exact, standard, fast, preview) \
     {#member, offsetof(ssdgs_render_options, member), 0, type, low, high, {exact, standard, fast, preview}}
@@ -4013,7 +4037,8 @@ static const ssdgs__number ssdgs__render_numbers[] = {
     SSDGS__O(alpha_threshold, 'r', 0, 1, 1.0 / 255, 1.0 / 255, 1.0 / 255, 2.0 / 255),
     SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 16, 1.0 / 4, 1.0 / 2),
     SSDGS__O(light_detail, 'r', 0.01, 8, 1, 1, 0.7, 0.6),
-    SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.6, 0.6, 0.4)};
+    SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.6, 0.6, 0.4),
+    SSDGS__O(level_detail, 'r', 0, 8, 0, 1, 0.7, 0.5)};
 /* clang-format on */
 #undef SSDGS__O
 enum { SSDGS__RENDER_NUMBERS = sizeof ssdgs__render_numbers / sizeof *ssdgs__render_numbers };
@@ -4297,6 +4322,7 @@ static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o) {
     o->translucency = object->translucency;
     o->kept = ssdgs__keeps(&o->settings) ? object->kept : 0;
     o->mask = object->mask;
+    o->presence = object->presence;
     if (o->settings.baked)
         o->settings.terms &= SSDGS_SHADOW_TERM, o->settings.shadow.layers = 0; /* eq. 7's */
 }
@@ -4330,6 +4356,7 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         SSDGS__FOLD(o.key, o.rotation);
         SSDGS__FOLD(o.key, o.scale);
         SSDGS__FOLD(o.key, o.offset);
+        SSDGS__FOLD(o.key, o.presence);
         o.terms = o.settings.terms & frame->options.terms;
         o.light_count = o.settings.baked && !(taken && o.kept > 0) ? 0 : light_count;
         frame->light_count = o.light_count > frame->light_count ? o.light_count : frame->light_count;
@@ -4795,6 +4822,7 @@ static ssdgs__projection ssdgs__projection_of(const ssdgs_frame *frame, const ss
     p.cy = v->cy;
     p.near_plane = v->near_plane / o->scale;
     p.depth_scale = o->scale;
+    p.presence = o->presence;
     p.log2_threshold = ssdgs__log2_threshold(frame);
     p.width = v->width;
     p.height = v->height;
@@ -7688,7 +7716,8 @@ struct ssdgs_scene {
     ssdgs_context *context;
     struct ssdgs__frame_memory *frame; /* of its frames */
     ssdgs_occluder occluder;
-    int maps; /* 1: light maps have been asked for, so every frame makes them */
+    ssdgs__buffer chosen; /* objects of a frame, by levels */
+    int maps;             /* 1: light maps have been asked for, so every frame makes them */
 };
 
 static const ssdgs_occluder *ssdgs__occluder_of(const ssdgs_scene *scene) {
@@ -7719,6 +7748,7 @@ SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene) {
     if (!scene || SSDGS__ENTER(scene->context, "ssdgs_scene_destroy")) return;
     ssdgs_context *context = scene->context;
     ssdgs__frame_memory_destroy(context, scene->frame);
+    ssdgs__release(context, scene->chosen.memory);
     ssdgs__release(context, scene);
     ssdgs__leave_and_drop(context);
 }
@@ -7727,6 +7757,61 @@ SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene) {
 static ssdgs_result ssdgs__scene_leave(ssdgs_scene *scene, ssdgs_result result) {
     if (result && scene->frame) scene->frame->mapped = 0;
     return ssdgs__leave(scene->context, result);
+}
+
+/* The Gaussians that an object needs: so many for each pixel of its box, whose shadow's mean area is a
+   quarter of its surface (Cauchy). */
+static double ssdgs__needed(const ssdgs_object *o, const ssdgs_camera *camera, double detail) {
+    const ssdgs__bounds *b = &o->model->bounds;
+    const double side[3] = {b->high[0] - b->low[0], b->high[1] - b->low[1], b->high[2] - b->low[2]};
+    const double area = (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]) / 2;
+    const double half = sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2]) / 2;
+    const double scale2 = ssdgs__scale2(o->to_world);
+    double z = (double)camera->view[11] - half * sqrt(scale2); /* of what may be nearest */
+    for (int i = 0; i < 3; i++) {
+        double at = (double)o->to_world[4 * i + 3];
+        for (int j = 0; j < 3; j++) at += (double)o->to_world[4 * i + j] * (b->low[j] + b->high[j]) / 2;
+        z += (double)camera->view[8 + i] * at;
+    }
+    return z > 0
+               ? detail * SSDGS__PER_PIXEL * area * scale2 * (double)camera->fx * (double)camera->fy / (z * z)
+               : 1e30;
+}
+
+/* Objects with the levels that their sizes in the picture ask for. Only they decide: nothing pops. */
+static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, ssdgs__request *request) {
+    ssdgs_context *context = scene->context;
+    ssdgs_object *chosen;
+    const double detail = (double)(request->options ? request->options->level_detail
+                                                    : ssdgs_render_options_default().level_detail);
+    int levels = 0, count = 0;
+    for (int i = 0; i < request->object_count; i++) levels += request->objects[i].level_count > 0;
+    if (!levels || !(detail > 0)) return SSDGS_OK;
+    SSDGS__RESERVE(scene->chosen, chosen, ssdgs_object, request->object_count + levels);
+    for (int i = 0; i < request->object_count; i++) {
+        ssdgs_object *o = chosen + count++;
+        *o = request->objects[i];
+        if (!o->level_count || o->mask) continue;
+        const ssdgs_result result = ssdgs__model_box(o->model);
+        if (result) return result;
+        const double needed = ssdgs__needed(o, request->camera, detail);
+        for (int j = 0; j < o->level_count; j++) {
+            const double share =
+                4 * (o->levels[j]->count / needed - 1); /* of the level, not of what is before */
+            if (!(share > 0)) break;
+            if (share < 1) {
+                chosen[count] = *o;
+                chosen[count].model = o->levels[j];
+                chosen[count++].presence *= (ssdgs_real)share;
+                o->presence *= (ssdgs_real)(1 - share);
+                break;
+            }
+            o->model = o->levels[j];
+        }
+    }
+    request->objects = chosen;
+    request->object_count = count;
+    return SSDGS_OK;
 }
 
 SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
@@ -7746,6 +7831,7 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     request.maps = scene->maps;
     request.mirrored = 1;
     request.occluder = ssdgs__occluder_of(scene);
+    if (!result) result = ssdgs__choose_levels(scene, &request);
     if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
     return ssdgs__scene_leave(scene, result);
@@ -10314,7 +10400,6 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 /* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by steps. */
 
 #define SSDGS__STATISTICS 3
-#define SSDGS__PER_PIXEL 0.375 /* more Gaussians than that take time and show nothing */
 #define SSDGS__FULL 0.36       /* of densify_until: so long there may be options.surplus times as many */
 #define SSDGS__LEAN 0.72       /* and from here on no more than the budget */
 #define SSDGS__SPLIT_SIZE 0.01 /* of the scene's extent: smaller ones are cloned, larger ones split */
@@ -12579,6 +12664,9 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, V_LT(V_SET(1), V_SET(0)));
         F(fade)(k, &rim, &p);
+        if (k->presence < 1) /* transmittances of parts multiply to that of the whole */
+            p.opacity =
+                V_SUB(V_SET(1), V_EXP(V_MUL(V_SET(k->presence), V_LOG(V_MAX(p.clear, V_SET(1e-30))))));
         V opacity = V_MUL(p.opacity, p.fade);
         if (k->compensate) opacity = V_MUL(opacity, V_SQRT(V_MUL(p.det0, p.inverse_det)));
         const V log2_opacity = V_MUL(V_LOG(V_MAX(opacity, V_SET(1e-30))), log2e);

@@ -580,10 +580,13 @@ static void test_refused(void) {
     ssdgs_object object = ssdgs_object_default(model);
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
     const ssdgs_image image = planes_of(shot);
-    for (int i = 0; i < 8; i++) {
-        static const double wrong[8] = {0, 0.09, 11, -1, 1e7, 0, 11, (double)NAN};
+    for (int i = 0; i < 11; i++) {
+        static const double wrong[11] = {0, 0.09, 11, -1, 1e7, 0, 11, (double)NAN, -0.01, 1.01, (double)NAN};
         object = ssdgs_object_default(model);
-        *(i < 3 ? &object.roughness : i < 5 ? &object.specular : &object.translucency) = (ssdgs_real)wrong[i];
+        *(i < 3   ? &object.roughness
+          : i < 5 ? &object.specular
+          : i < 8 ? &object.translucency
+                  : &object.presence) = (ssdgs_real)wrong[i];
         CHECK(ssdgs_scene_render(scene, &object, 1, &camera, NULL, 0, NULL, &image, NULL) ==
               SSDGS_ERR_ARGUMENT);
         CHECK(strstr(ssdgs_error_message(context), "object 0: roughness") != NULL);

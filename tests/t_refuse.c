@@ -79,6 +79,7 @@ static const field render_fields[] = {
     R(max_error, 0, 1),
     R(light_detail, 0.01, 8),
     R(transport_detail, 0.1, 8),
+    R(level_detail, 0, 8),
 #undef R
 #define I(name, low, high) WHOLE(ssdgs_render_options, name, low, high)
     I(terms, 0, 15),
@@ -275,7 +276,8 @@ static const preset render_presets[] = {/* default, exact, fast, preview */
                                         R(alpha_threshold, NONE, NONE, NONE, 2.0 / 255),
                                         R(max_error, 1.0 / 16, 0, 1.0 / 4, 1.0 / 2),
                                         R(light_detail, 1, 1, 0.7, 0.6),
-                                        R(transport_detail, 0.6, 1, 0.6, 0.4)
+                                        R(transport_detail, 0.6, 1, 0.6, 0.4),
+                                        R(level_detail, 1, 0, 0.7, 0.5)
 #undef I
 #undef R
 };
@@ -379,10 +381,10 @@ static void test_presets(void) {
     CHECK(fabs((double)g.opacity - 0.1) < 1e-6);
     const ssdgs_object object = ssdgs_object_default(model);
     CHECK(object.model == model && !object.mask);
-    const ssdgs_real ones[6] = {object.tint[0],   object.tint[1],  object.tint[2],
-                                object.roughness, object.specular, object.translucency};
+    const ssdgs_real ones[7] = {object.tint[0],  object.tint[1],      object.tint[2], object.roughness,
+                                object.specular, object.translucency, object.presence};
     for (int i = 0; i < 12; i++) CHECK(!(fabs((double)object.to_world[i] - (i % 5 == 0)) > 0));
-    for (int i = 0; i < 6; i++) CHECK(!(fabs((double)ones[i] - 1) > 0));
+    for (int i = 0; i < 7; i++) CHECK(!(fabs((double)ones[i] - 1) > 0));
 }
 
 static void test_bounds(void) {

@@ -606,7 +606,15 @@ static void test_dark(void) {
     ssdgs_model_destroy(model);
 }
 
-/* ---- shadows from and on other things ---- */
+/* ---- how much there is of an object ---- */
+
+static void refused(const ssdgs_object *objects, int count, const char *word) {
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_image image = planes_of(shot);
+    CHECK(ssdgs_scene_render(scene, objects, count, &camera, NULL, 0, NULL, &image, NULL) != SSDGS_OK);
+    if (!CHECK(strstr(ssdgs_error_message(context), word) != NULL))
+        printf("    %s\n", ssdgs_error_message(context));
+}
 
 static ssdgs_model *plate_of(const ssdgs_settings *s, double width, double opacity) {
     ssdgs_model *plate = NULL;
@@ -619,6 +627,184 @@ static ssdgs_model *plate_of(const ssdgs_settings *s, double width, double opaci
     CHECK(!ssdgs_model_set(plate, 0, &g));
     return plate;
 }
+
+/* At a Gaussian's centre, and of the light behind it, transmittance is the whole's to the power of presence;
+   so parts that stand in one place multiply to the whole. All of it is what it was to the bit, nothing is not
+   there.
+ */
+static void test_presence(void) {
+    static const double shares[4] = {0.3, 0.7, 1, 0};
+    ssdgs_settings s = small_settings();
+    s.light_map.size = 256;
+    for (int baked = 0; baked < 2; baked++) {
+        s.baked = baked;
+        ssdgs_model *plate = plate_of(&s, 0.3, 0.8);
+        const ssdgs_real eye[3] = {0, 0, 3}, target[3] = {0, 0, 0}, up[3] = {0, 1, 0}, behind[3] = {0, 0, -1};
+        const ssdgs_camera camera =
+            ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE + 1, SIDE - 1);
+        const ssdgs_light light = point_light(0, 0, 3);
+        ssdgs_image image;
+        static ssdgs_real alpha[(SIDE + 1) * (SIDE - 1)];
+        memset(&image, 0, sizeof image);
+        image.alpha = alpha;
+        for (int i = 0; i < 5; i++) { /* the last: both parts */
+            ssdgs_object objects[2] = {ssdgs_object_default(plate), ssdgs_object_default(plate)};
+            ssdgs_render_stats stats;
+            ssdgs_real passed = -1;
+            for (int k = 0; k < 2; k++) objects[k].presence = (ssdgs_real)shares[i == 4 ? k : i];
+            const int count = i == 4 ? 2 : 1;
+            CHECK(!ssdgs_scene_light(scene, objects, count, &light, 1, NULL));
+            CHECK(!ssdgs_scene_shadow(scene, 0, behind, 1, &passed));
+            CHECK(!ssdgs_scene_render(scene, objects, count, &camera, &light, 1, NULL, &image, &stats));
+            const double share = i == 4 ? 1 : shares[i], want = pow(0.2, share);
+            const double seen = 1 - (double)alpha[(SIDE - 1) / 2 * (SIDE + 1) + (SIDE + 1) / 2];
+            CHECK(fabs(seen - want) < 2e-3); /* half a pixel beside the centre */
+            CHECK(fabs((double)passed - want) < 0.04 && (share > 0 || passed >= 1));
+            CHECK(stats.visible == (share > 0 ? count : 0));
+        }
+        ssdgs_model_destroy(plate);
+    }
+    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
+    const ssdgs_light light = point_light(2, -2, 2);
+    s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 300, 0.5);
+    ssdgs_object object = ssdgs_object_default(model);
+    CHECK(object.presence >= 1 && object.presence <= 1 && !object.levels && !object.level_count);
+    together(&object, 1, &camera, &light, 1, NULL, shot);
+    object.presence = (ssdgs_real)0.5; /* nothing is kept of another one */
+    together(&object, 1, &camera, &light, 1, NULL, shot + 1);
+    CHECK(!shot[1].stats.camera_cached && !shot[1].stats.lights_cached && !same(shot, shot + 1));
+    object.presence = 1;
+    together(&object, 1, &camera, &light, 1, NULL, shot + 1);
+    CHECK(same(shot, shot + 1));
+    ssdgs_model_destroy(model);
+}
+
+/* Gaussians for a model's pixels by the box's shadow, averaged over directions, 3 for 8 pixels. */
+static double needed_of(const ssdgs_model *model, double scale, double distance, double focal) {
+    double side[3], half = 0, area = 0;
+    for (int c = 0; c < 3; c++) {
+        side[c] = model->bounds.high[c] - model->bounds.low[c];
+        half += side[c] * side[c] / 4;
+    }
+    for (int i = 0; i < 10000; i++) {
+        double d[3];
+        direction_of(i, 10000, d);
+        for (int c = 0; c < 3; c++) area += fabs(d[c]) * side[(c + 1) % 3] * side[(c + 2) % 3] / 10000;
+    }
+    const double near = distance - scale * sqrt(half);
+    return near > 0 ? 3.0 / 8 * area * scale * scale * focal * focal / (near * near) : 1e30;
+}
+
+/* The level that covered pixels ask for, or two that fade into each other, are drawn as if they had been
+   placed so. Where one comes and where the other has gone nothing pops. */
+static void test_levels(void) {
+    enum { STEPS = 120 };
+    static const int counts[3] = {500, 200, 60};
+    ssdgs_settings s = small_settings();
+    ssdgs_model *models[3];
+    ssdgs_render_options options = ssdgs_render_options_exact(); /* no skipping that comes and goes */
+    const ssdgs_light light = point_light(2, -2, 2);
+    int drawn[3] = {0, 0, 0}, both = 0;
+    double pop = 0, apart = 0;
+    for (int i = 0; i < 3; i++) models[i] = cloud(&s, 600 * i, counts[i], 0.5);
+    for (int step = 0; step < STEPS; step++) {
+        const double distance = 1.2 * pow(1.03, step), scale = 1.25;
+        const ssdgs_camera camera = camera_from(0, -distance, 0);
+        ssdgs_object whole = placed(models[0], 0.3, scale, step & 1, 0, 0, 0), want[2] = {whole, whole};
+        double middle = 0, share = 0;
+        int level = 0;
+        whole.levels = models + 1;
+        whole.level_count = 2;
+        options.level_detail = (ssdgs_real)0.5;
+        together(&whole, 1, &camera, &light, 1, &options, shot);
+        for (int c = 0; c < 3; c++) /* the box's centre lies on the world's y */
+            middle +=
+                (double)whole.to_world[4 + c] * (models[0]->bounds.low[c] + models[0]->bounds.high[c]) / 2;
+        const double needed = 0.5 * needed_of(models[0], scale, distance + middle, (double)camera.fx);
+        while (level < 2 && counts[level + 1] >= 1.25 * needed) level++;
+        if (level < 2) share = (counts[level + 1] / needed - 1) / 0.25;
+        want[0].model = models[level];
+        if (share > 0) {
+            want[0].presence = (ssdgs_real)(1 - share);
+            want[1].model = models[level + 1];
+            want[1].presence = (ssdgs_real)share;
+        }
+        together(want, share > 0 ? 2 : 1, &camera, &light, 1, &options, shot + 1);
+        double off = 0;
+        for (int i = 0; i < 3 * PIXELS; i++)
+            off = test_most(off, fabs((double)shot[0].value[i] - (double)shot[1].value[i]));
+        if (!CHECK(off < 1e-3 && shot[0].stats.gaussians == shot[1].stats.gaussians))
+            printf("    step %d: level %d, share %g: %g off\n", step, level, share, off);
+        drawn[level]++;
+        both += share > 0;
+        options.level_detail = 0; /* the model itself, as with a mask or by exact */
+        together(&whole, 1, &camera, &light, 1, &options, shot + 1);
+        together(want, 0, &camera, &light, 1, &options, shot + 2);
+        want[0] = whole, want[0].level_count = 0;
+        together(want, 1, &camera, &light, 1, &options, shot + 2);
+        CHECK(same(shot + 1, shot + 2));
+        for (int i = 0; i < 3 * PIXELS && level && !(share > 0); i++)
+            apart = test_most(apart, fabs((double)shot[0].value[i] - (double)shot[1].value[i]));
+        if (step % 20) continue;
+        static unsigned char mask[500];
+        memset(mask, 255, sizeof mask);
+        want[1] = whole, want[1].mask = mask;
+        options.level_detail = (ssdgs_real)0.5;
+        together(want + 1, 1, &camera, &light, 1, &options, shot + 1);
+        CHECK(same(shot + 1, shot + 2));
+        const ssdgs_render_options exact = ssdgs_render_options_exact();
+        together(&whole, 1, &camera, &light, 1, &exact, shot + 1);
+        together(want, 1, &camera, &light, 1, &exact, shot + 2);
+        CHECK(same(shot + 1, shot + 2));
+    }
+    CHECK(drawn[0] > 10 && drawn[1] > 10 && drawn[2] > 10 && both > 5);
+    for (int end = 0; end < 4; end++) {
+        double low = 1.2, high = 100;
+        ssdgs_object whole = ssdgs_object_default(models[0]);
+        whole.levels = models + 1;
+        whole.level_count = 2;
+        options.level_detail = 1;
+        for (int c = 0; c < 3; c++) /* the box's centre is where the camera looks */
+            whole.to_world[4 * c + 3] =
+                -(ssdgs_real)(models[0]->bounds.low[c] + models[0]->bounds.high[c]) / 2;
+        for (int i = 0; i < 60; i++) {
+            const double middle = (low + high) / 2,
+                         needed = needed_of(models[0], 1, middle, (double)camera_from(0, -1, 0).fx);
+            *(needed * (end % 2 ? 1.25 : 1) > counts[1 + end / 2] ? &low : &high) = middle;
+        }
+        for (int i = 0; i < 2; i++) {
+            const ssdgs_camera camera = camera_from(0, -low * (i ? 1.0003 : 0.9997), 0);
+            together(&whole, 1, &camera, &light, 1, &options, shot + i);
+            /* first the finer one alone, then both, then the coarser one alone */
+            const int finer = counts[end / 2], coarser = counts[1 + end / 2];
+            CHECK(shot[i].stats.gaussians == (end % 2 != i ? finer + coarser : i ? coarser : finer));
+        }
+        for (int i = 0; i < 3 * PIXELS; i++)
+            pop = test_most(pop, fabs((double)shot[0].value[i] - (double)shot[1].value[i]));
+    }
+    if (!CHECK(pop < 0.05 * apart)) printf("    pops by %g, %g apart\n", pop, apart);
+    ssdgs_object object = ssdgs_object_default(models[1]);
+    object.level_count = 1;
+    refused(&object, 1, "object 0: 1 levels at NULL");
+    object.levels = models, object.level_count = -1;
+    refused(&object, 1, "object 0: -1 levels");
+    object.level_count = 1;
+    refused(&object, 1, "object 0: level 0 has 500 Gaussians, over four fifths of the 200 before it");
+    object = ssdgs_object_default(models[0]), object.levels = models + 1, object.level_count = 2;
+    ssdgs_model *wrong[3] = {models[1], models[1], NULL};
+    object.levels = wrong;
+    refused(&object, 1, "object 0: level 1 has 200 Gaussians, over four fifths of the 200 before it");
+    object.levels = wrong + 2, object.level_count = 1;
+    refused(&object, 1, "object 0: level 0 is not of its model's context");
+    s.transfer = SSDGS_TRANSFER_NONE;
+    wrong[2] = cloud(&s, 0, 10, 0.5);
+    refused(&object, 1, "object 0: level 0 is not of its model's context, transfer or kind");
+    ssdgs_model_destroy(wrong[2]);
+    for (int i = 0; i < 3; i++) ssdgs_model_destroy(models[i]);
+}
+
+/* ---- shadows from and on other things ---- */
 
 /* Behind one Gaussian the light is 1 - its alpha, by its formula; before it and beside it nothing is missing.
  */
@@ -1299,7 +1485,7 @@ static ssdgs_light any_light(uint64_t at) {
 /* Whatever an engine changes, in any order: a frame is what a new scene makes of it, and its colours do not
    depend on the planes that are asked for. */
 static void test_anything(void) {
-    enum { MODELS = 4, OBJECTS = 4, LIGHTS = 3, SEQUENCES = 12, STEPS = 25, CHANGES = 13 };
+    enum { MODELS = 4, OBJECTS = 4, LIGHTS = 3, SEQUENCES = 12, STEPS = 25, CHANGES = 14 };
     for (uint64_t sequence = 0; sequence < SEQUENCES; sequence++) {
         uint64_t at = 50000 + 10000 * sequence;
         ssdgs_model *models[MODELS];
@@ -1341,6 +1527,7 @@ static void test_anything(void) {
             case 10: count = 1 + (int)(OBJECTS * draw(at + 7)); break;
             case 11: light_count = (int)((LIGHTS + 1) * draw(at + 8)); break;
             case 12: options.ambient[0][1] = some; break;
+            case 13: object->presence = some > (ssdgs_real)0.7 ? 1 : some; break;
             }
             if (draw(at + 9) < 0.1) ssdgs_model_arrays(models[0]).gaussians[5] += (ssdgs_real)0.1;
             if (draw(at + 30) < 0.3) camera = camera_from(2 * draw(at + 31) - 1, -3, 1);
@@ -1612,7 +1799,7 @@ static void test_failed_frame(void) {
     ssdgs_context *was = context;
     ssdgs_light lights[LIGHTS];
     int failed = 0, wrong = 0;
-    for (int k = 0; k < 320; k++) {
+    for (int k = 0; k < 336; k++) {
         const int many = k / 2 % 2 ? OBJECTS : 1; /* objects of the second frame */
         const ssdgs_camera camera = camera_from(0, -3, 1);
         const ssdgs_image image = planes_of(shot);
@@ -1624,9 +1811,13 @@ static void test_failed_frame(void) {
         TEST_METER(desc, &memory);
         CHECK(!ssdgs_context_create(&desc, &context));
         for (int i = 0; i < 2; i++) CHECK(!ssdgs_scene_create(context, scenes + i));
-        ssdgs_model *plate = plate_of(&s, 0.3, 0.8);
+        ssdgs_model *plate = plate_of(&s, 0.3, 0.8), *less = NULL;
+        CHECK(!ssdgs_model_create(context, &s, 0, &less));
+        ssdgs_model *const levels[1] = {less};
         for (int i = 0; i < OBJECTS; i++) {
             object[i] = ssdgs_object_default(plate);
+            object[i].levels = levels;
+            object[i].level_count = 1;
             object[i].to_world[3] = (ssdgs_real)(5 * i);
         }
         for (int i = 0; i < LIGHTS; i++) lights[i] = point_light(0.1 * i, 0, 3);
@@ -1647,7 +1838,7 @@ static void test_failed_frame(void) {
             wrong += memcmp(fraction, fraction + 1, sizeof *fraction) != 0;
         }
         for (int i = 0; i < 2; i++) ssdgs_scene_destroy(scenes[i]);
-        ssdgs_model_destroy(plate);
+        ssdgs_model_destroy(plate), ssdgs_model_destroy(less);
         ssdgs_context_destroy(context);
     }
     if (!CHECK(memory.live == 0 && failed > 4 && !wrong)) printf("    %d failed, %d wrong\n", failed, wrong);
@@ -1683,14 +1874,6 @@ static void test_blurred(void) {
     }
     CHECK(drawn[0] > 0.5 && drawn[1] > 100);
     ssdgs_model_destroy(model);
-}
-
-static void refused(const ssdgs_object *objects, int count, const char *word) {
-    const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
-    const ssdgs_image image = planes_of(shot);
-    CHECK(ssdgs_scene_render(scene, objects, count, &camera, NULL, 0, NULL, &image, NULL) != SSDGS_OK);
-    if (!CHECK(strstr(ssdgs_error_message(context), word) != NULL))
-        printf("    %s\n", ssdgs_error_message(context));
 }
 
 /* Memory that is given back is taken anew, with the same picture. */
@@ -1942,6 +2125,8 @@ int main(void) {
     test_baked();
     test_scene_depth();
     test_dark();
+    test_presence();
+    TEST_ROW("97", "levels of detail", test_levels());
     test_query();
     test_occluder();
     test_ahead();

@@ -1309,7 +1309,7 @@ static int gpu_takes(const gpu *g, const ssdgs_frame *frame) {
     if (!gpu_holds(g, frame)) return 0;
     for (int i = 0; i < 3; i++) plain = plain && gpu_is(o->offset[i], 0) && gpu_is(o->tint[i], 1);
     plain = plain && gpu_is(o->roughness, 1) && gpu_is(o->specular, 1) && gpu_is(o->translucency, 1) &&
-            gpu_is(o->kept, 0);
+            gpu_is(o->presence, 1) && gpu_is(o->kept, 0);
     return plain && !o->turned && gpu_is(o->scale, 1) && !o->settings.baked && !o->mask && o->gaussians.count;
 }
 

@@ -292,6 +292,7 @@ static void more_picture(input *in, picture *p) {
     p->hidden = flags >> 2 & 1;
     for (int i = 0; p->hidden && i < 5; i++) depth[i] = draw_size(in, HUGE_VAL, 6);
     for (int i = 0; p->hidden && i < MOST_SIDE * MOST_STRIDE; i++) p->depth[i] = depth[i % 5];
+    o->level_detail = draw_size(in, 1, 1);
 }
 
 static ssdgs_result take_picture(ssdgs_model *model, picture *p) {
@@ -408,6 +409,8 @@ static ssdgs_object draw_object(input *in, ssdgs_model *const models[2]) {
     o.roughness = draw_size(in, 1, 4);
     o.specular = draw_size(in, 1, 4);
     o.translucency = draw_size(in, 1, 4);
+    o.presence = flags & 16 ? draw_size(in, 1, 1) : 1;
+    if (flags & 32 && o.model == models[0]) o.levels = models + 1, o.level_count = 1;
     if (flags & 8) o.mask = mask;
     return o;
 }
