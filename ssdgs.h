@@ -1160,6 +1160,8 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
 #define SSDGS__INLINE inline __attribute__((always_inline))
 #define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
+#define SSDGS__PREFETCH(p) __builtin_prefetch(p)
+#define SSDGS__UNUSED __attribute__((unused))
 #if defined(__clang__)
 #define SSDGS__UNROLL _Pragma("clang loop unroll(full)")
 #define SSDGS__UNROLL_SCALAR /* its vectoriser does better */
@@ -1168,27 +1170,19 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__UNROLL_SCALAR \
     _Pragma("GCC unroll 4") /* sixteenfold is slower, and half of the time to compile */
 #endif
-#elif defined(_MSC_VER)
+#else
+#ifdef _MSC_VER
 #define SSDGS__INLINE __forceinline
-#define SSDGS__ATTRIBUTE(target_string)
 #else
 #define SSDGS__INLINE inline
+#endif
 #define SSDGS__ATTRIBUTE(target_string)
+#define SSDGS__PREFETCH(p) ((void)(p))
+#define SSDGS__UNUSED
 #endif
 #ifndef SSDGS__UNROLL
 #define SSDGS__UNROLL
 #define SSDGS__UNROLL_SCALAR
-#endif
-#if defined(__GNUC__) && !defined(__TINYC__)
-#define SSDGS__PREFETCH(p) __builtin_prefetch(p)
-#else
-#define SSDGS__PREFETCH(p) ((void)(p))
-#endif
-
-#if defined(__GNUC__) && !defined(__TINYC__)
-#define SSDGS__UNUSED __attribute__((unused))
-#else
-#define SSDGS__UNUSED
 #endif
 #ifdef SSDGS_NO_TRAINER
 #define SSDGS__TRAINING SSDGS__UNUSED /* what only training calls is left out by the compiler */
@@ -1402,7 +1396,7 @@ typedef struct ssdgs__tile {
     ssdgs_light_pixel *light_map; /* of the tile, or NULL */
     const ssdgs_instances *of_gaussian; /* of a light's only view, or NULL */
     const ssdgs_real *scene_depth;      /* [micro-tile][16 lanes] entries must be nearer, or NULL */
-    ssdgs_real *median;          /* [micro-tile][16 lanes] where transmittance falls below 1/2, or NULL */
+    ssdgs_real *median; /* [micro-tile][64] in the first 16 lanes where it falls below 1/2, or NULL */
     const uint16_t *material_of; /* NULL: layers are those of all; else of `material` alone */
     int material;
 } ssdgs__tile;
@@ -1853,11 +1847,22 @@ static ssdgs_result ssdgs__leave(ssdgs_context *context, ssdgs_result result) {
         if (wrong) return ssdgs__fail(context, SSDGS_ERR_ARGUMENT, __VA_ARGS__); \
     } while (0)
 
+/* Returns what `call` does, unless all is well. */
+#define SSDGS__TRY(call) \
+    do { \
+        const ssdgs_result tried_ = (call); \
+        if (tried_) return tried_; \
+    } while (0)
+
+/* A public function begins, or refuses to. */
+#define SSDGS__BEGIN(object, context, function) \
+    if (!(object)) return SSDGS_ERR_ARGUMENT; \
+    SSDGS__TRY(SSDGS__ENTER(context, function))
+
 /* The body of a public function: while `call` is at work, other calls on the context are refused. */
 #define SSDGS__GUARD(object, context, function, call) \
-    if (!(object)) return SSDGS_ERR_ARGUMENT; \
-    const ssdgs_result entered_ = SSDGS__ENTER(context, function); \
-    return entered_ ? entered_ : ssdgs__leave(context, call)
+    SSDGS__BEGIN(object, context, function); \
+    return ssdgs__leave(context, call)
 
 static void ssdgs__context_drop(ssdgs_context *context);
 
@@ -1871,17 +1876,8 @@ static void ssdgs__leave_and_drop(ssdgs_context *context) {
     SSDGS__PUBLISH(&context->busy, 0);
 }
 
-static int ssdgs__product_fits(size_t a, size_t b, size_t *product) {
-    if (b && a > SIZE_MAX / b) return 0;
-    *product = a * b;
-    return 1;
-}
-
 /* a b, or SIZE_MAX, which is more than there is. */
-static size_t ssdgs__times(size_t a, size_t b) {
-    size_t product;
-    return ssdgs__product_fits(a, b, &product) ? product : SIZE_MAX;
-}
+static size_t ssdgs__times(size_t a, size_t b) { return b && a > SIZE_MAX / b ? SIZE_MAX : a * b; }
 
 static void *ssdgs__default_allocate(void *user, size_t bytes) {
     (void)user;
@@ -1927,8 +1923,8 @@ typedef struct ssdgs__buffer {
 } ssdgs__buffer;
 
 static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
-    size_t bytes;
-    if (!ssdgs__product_fits(count, size, &bytes) || bytes > SIZE_MAX - bytes / 8)
+    size_t bytes = ssdgs__times(count, size);
+    if (bytes > SIZE_MAX - bytes / 8)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes does not fit in memory",
                            count, size);
     if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
@@ -2176,12 +2172,9 @@ static void ssdgs__group_task(void *data, int index) {
 
 /* Runs tasks: in groups on a job system, where each costs more than on our threads. */
 static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task, void *data) {
-    ssdgs__group_job job;
+    ssdgs__group_job job = {task, data, count,
+                            context->groups && context->groups < count ? context->groups : count};
     ssdgs__pool_forked(context); /* within this call, by a callback */
-    job.task = task;
-    job.data = data;
-    job.count = count;
-    job.groups = context->groups && context->groups < count ? context->groups : count;
     if (count < 1) return;
     if (job.groups == count) context->parallel.run(context->parallel.user, count, task, data);
     else context->parallel.run(context->parallel.user, job.groups, ssdgs__group_task, &job);
@@ -2189,9 +2182,7 @@ static void ssdgs__parallel(ssdgs_context *context, int count, ssdgs__task task,
 
 SSDGS_API ssdgs_result ssdgs_context_run(ssdgs_context *context, int count,
                                          void (*task)(void *data, int index), void *data) {
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(context, "ssdgs_context_run");
-    if (result) return result;
+    SSDGS__BEGIN(context, context, "ssdgs_context_run");
     if (!task && count > 0) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_context_run", "task"));
     ssdgs__parallel(context, count, task, data);
     return ssdgs__leave(context, SSDGS_OK);
@@ -2416,10 +2407,9 @@ struct ssdgs_model {
     double low[3], high[3];            /* the box that holds all that its Gaussians draw */
     ssdgs__bounds bounds;              /* of them to three standard deviations, but for a few strays */
     uint64_t box_revision;             /* of which revision both are */
-    ssdgs_real *sky_share; /* (2 x sky_share_room) the share of an even sky that each Gaussian gets; as many
-                             are scratch */
+    ssdgs__buffer
+        sky_share; /* (2 x capacity) the share of an even sky that each Gaussian gets, and scratch */
     uint64_t sky_share_revision; /* for which of its revisions */
-    size_t sky_share_room;
 };
 
 /* Parameters that learn together: planes of every Gaussian, then what all share */
@@ -2622,32 +2612,22 @@ static int ssdgs__is_placed(const ssdgs_settings *s) {
     return memcmp(&s->placement, &here.placement, sizeof here.placement) != 0;
 }
 
-/* A turn, axis times radians, as a quaternion. */
-static void ssdgs__turn_quaternion(const double turn[3], double q[4]) {
+/* Where a placed model is drawn, (3,4) as ssdgs_object.to_world. */
+static void ssdgs__placement_matrix(const ssdgs_settings *s, ssdgs_real m[12]) {
+    double turn[3], q[4]; /* axis times radians, the same as a quaternion */
+    for (int i = 0; i < 3; i++) turn[i] = (double)s->placement.turn[i];
     const double angle = sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
     q[0] = cos(0.5 * angle);
     for (int i = 0; i < 3; i++) q[1 + i] = angle > 0 ? sin(0.5 * angle) * turn[i] / angle : 0;
-}
-
-/* The rotation of a unit quaternion. */
-static void ssdgs__quaternion_matrix(const double q[4], double r[9]) {
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) {
             const int k = 3 - i - j; /* the third axis, where i and j differ */
             const double cross = i == j ? 0 : (j - i + 3) % 3 == 1 ? -q[0] * q[1 + k] : q[0] * q[1 + k];
-            r[3 * i + j] = 2 * (q[1 + i] * q[1 + j] + cross) + (i == j ? 2 * q[0] * q[0] - 1 : 0);
+            const double r = 2 * (q[1 + i] * q[1 + j] + cross) + (i == j ? 2 * q[0] * q[0] - 1 : 0);
+            m[4 * i + j] = (ssdgs_real)((double)s->placement.scale * r);
         }
-}
-
-/* Where a placed model is drawn, (3,4) as ssdgs_object.to_world. */
-static void ssdgs__placement_matrix(const ssdgs_settings *s, ssdgs_real m[12]) {
-    double turn[3], q[4], r[9];
-    for (int i = 0; i < 3; i++) turn[i] = (double)s->placement.turn[i];
-    ssdgs__turn_quaternion(turn, q);
-    ssdgs__quaternion_matrix(q, r);
-    for (int i = 0; i < 12; i++)
-        m[i] = i % 4 == 3 ? s->placement.move[i / 4]
-                          : (ssdgs_real)((double)s->placement.scale * r[i / 4 * 3 + i % 4]);
+        m[4 * i + 3] = s->placement.move[i];
+    }
 }
 
 /* Whether, with these terms, light scatters by settings.medium, not by a network. */
@@ -2674,8 +2654,7 @@ static ssdgs_result ssdgs__settings_check(ssdgs_context *context, const ssdgs_se
         if (n->at == offsetof(ssdgs_settings, medium.scattering) && medium) low = 1e-12;
         if (n->at >= offsetof(ssdgs_settings, medium.scattering) && !medium)
             high = (double)FLT_MAX, low = -high;
-        const ssdgs_result result = ssdgs__number_check(context, "settings", n, s, low, high);
-        if (result) return result;
+        SSDGS__TRY(ssdgs__number_check(context, "settings", n, s, low, high));
     }
     SSDGS__REFUSE(s->placement.scale < (ssdgs_real)1e-9 && s->placement.scale > (ssdgs_real)-1e-9,
                   "settings: placement.scale = %g is too small", (double)s->placement.scale);
@@ -2741,7 +2720,7 @@ static void ssdgs__model_drop(ssdgs_model *model) {
     ssdgs__release(context, model->gaussians);
     ssdgs__release(context, model->globals);
     ssdgs__frame_memory_destroy(context, model->frame);
-    ssdgs__release(context, model->sky_share);
+    ssdgs__release(context, model->sky_share.memory);
     ssdgs__release(context, model);
     ssdgs__context_drop(context);
 }
@@ -2750,8 +2729,7 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
                                         ssdgs_model **out) {
     const ssdgs_settings s = settings ? *settings : ssdgs_settings_default();
     if (!out) return ssdgs__null(context, "ssdgs_model_create", "out");
-    const ssdgs_result result = ssdgs__settings_check(context, &s);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__settings_check(context, &s));
     SSDGS__REFUSE(count < 0, "a model of %d Gaussians: fewer than 0", count);
     if (count > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a model of %d Gaussians: over 2^28", count);
@@ -2767,11 +2745,9 @@ static ssdgs_result ssdgs__model_create(ssdgs_context *context, const ssdgs_sett
     model->global_count = first[SSDGS__GLOBAL_GROUPS];
     model->globals = (ssdgs_real *)ssdgs__allocate(context, model->global_count * sizeof(ssdgs_real));
     model->capacity = (size_t)(count / SSDGS__BLOCK + 1) * SSDGS__BLOCK;
-    size_t bytes;
     model->channels = SSDGS_CHANNELS;
     if (ssdgs__keeps(&s)) model->channels = ssdgs__kept_plane(&s) + 3 + 3 * ssdgs__harmonics(s.harmonics);
-    if (!ssdgs__product_fits(model->capacity, (size_t)model->channels * sizeof(ssdgs_real), &bytes))
-        bytes = SIZE_MAX;
+    const size_t bytes = ssdgs__times(model->capacity, (size_t)model->channels * sizeof(ssdgs_real));
     if (model->globals) model->gaussians = (ssdgs_real *)ssdgs__allocate(context, bytes);
     if (!model->gaussians) {
         ssdgs__model_drop(model);
@@ -3002,24 +2978,20 @@ SSDGS_API ssdgs_gaussian ssdgs_gaussian_default(void) {
 /* One lobe, e^(-u / alpha^2) as Beckmann's is nearly: u = 1 - (n.h)^2, n the pixel's. */
 static ssdgs_result ssdgs__gaussian_mirror(ssdgs_model *model, const ssdgs_real roughness[2],
                                            ssdgs_gaussian *gaussian) {
-    size_t first[SSDGS__GLOBAL_GROUPS + 1];
+    ssdgs_context *context = model->context;
+    const ssdgs_model_view shared = ssdgs__model_view(model);
     if (!roughness || !gaussian)
-        return ssdgs__null(model->context, "ssdgs_gaussian_mirror", roughness ? "gaussian" : "roughness");
-    if (model->settings.asg != SSDGS_ASG_DEFERRED)
-        return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
-                           "ssdgs_gaussian_mirror: the model's highlights are geometric");
+        return ssdgs__null(context, "ssdgs_gaussian_mirror", roughness ? "gaussian" : "roughness");
+    SSDGS__REFUSE(model->settings.asg != SSDGS_ASG_DEFERRED,
+                  "ssdgs_gaussian_mirror: the model's highlights are geometric");
     for (int i = 0; i < 2; i++)
-        if (!(roughness[i] >= (ssdgs_real)0.01 && roughness[i] <= 1))
-            return ssdgs__fail(model->context, SSDGS_ERR_ARGUMENT,
-                               "ssdgs_gaussian_mirror: roughness[%d] = %g is not within 0.01 .. 1", i,
-                               (double)roughness[i]);
-    ssdgs__global_groups(&model->settings, first);
-    ssdgs_real *sharpness = model->globals + first[SSDGS__ASG_SHARPNESS],
-               *sigma = model->globals + first[SSDGS__ASG_SIGMA];
+        SSDGS__REFUSE(!(roughness[i] >= (ssdgs_real)0.01 && roughness[i] <= 1),
+                      "ssdgs_gaussian_mirror: roughness[%d] = %g is not within 0.01 .. 1", i,
+                      (double)roughness[i]);
     for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
-        sharpness[2 * j] = 0;
-        sharpness[2 * j + 1] = -SSDGS__RAW_LIMIT;
-        sigma[j] = (ssdgs_real)ssdgs__softplus_inverse(1.0 / SSDGS_ASG_COUNT);
+        shared.asg_sharpness[2 * j] = 0;
+        shared.asg_sharpness[2 * j + 1] = -SSDGS__RAW_LIMIT;
+        shared.asg_sigma[j] = (ssdgs_real)ssdgs__softplus_inverse(1.0 / SSDGS_ASG_COUNT);
     }
     ssdgs__model_changed(model);
     for (int i = 0; i < 2; i++) gaussian->sharpness[i] = 1 / (roughness[i] * roughness[i]);
@@ -3054,10 +3026,8 @@ static ssdgs_result ssdgs__gaussian_check(const ssdgs_model *model, const char *
 }
 
 SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdgs_gaussian *gaussian) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_set");
-    if (result) return result;
-    result = ssdgs__gaussian_check(model, "ssdgs_model_set", index, gaussian);
+    SSDGS__BEGIN(model, model->context, "ssdgs_model_set");
+    ssdgs_result result = ssdgs__gaussian_check(model, "ssdgs_model_set", index, gaussian);
     const int baked = model->settings.baked;
     const char *wrong = result ? NULL : ssdgs__gaussian_wrong(gaussian);
     if (wrong)
@@ -3083,10 +3053,8 @@ SSDGS_API ssdgs_result ssdgs_model_set(ssdgs_model *model, int index, const ssdg
 }
 
 SSDGS_API ssdgs_result ssdgs_model_get(const ssdgs_model *model, int index, ssdgs_gaussian *gaussian) {
-    if (!model) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(model->context, "ssdgs_model_get");
-    if (result) return result;
-    result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
+    SSDGS__BEGIN(model, model->context, "ssdgs_model_get");
+    ssdgs_result result = ssdgs__gaussian_check(model, "ssdgs_model_get", index, gaussian);
     ssdgs_real raw[SSDGS_CHANNELS];
     if (!result) {
         ssdgs__gaussian_raw(model, (size_t)index, raw);
@@ -3298,8 +3266,7 @@ static void ssdgs__frame_memory_destroy(ssdgs_context *context, ssdgs__frame_mem
 
 #define SSDGS__RESERVE_BY(reserve, buffer, pointer, type, count) \
     do { \
-        const ssdgs_result reserved_ = reserve(context, &(buffer), (size_t)(count), sizeof(type)); \
-        if (reserved_) return reserved_; \
+        SSDGS__TRY(reserve(context, &(buffer), (size_t)(count), sizeof(type))); \
         (pointer) = (type *)(buffer).memory; \
     } while (0)
 #define SSDGS__RESERVE(buffer, pointer, type, count) \
@@ -3446,12 +3413,6 @@ SSDGS_API ssdgs_light ssdgs_light_spot(const ssdgs_real position[3], const ssdgs
     light.cone[0] = inner;
     light.cone[1] = outer;
     return light;
-}
-
-/* For frames of which only the lights' views count. */
-static ssdgs_camera ssdgs__no_camera(void) {
-    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
-    return ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16);
 }
 
 SSDGS__SMALL_BEGIN
@@ -3690,6 +3651,17 @@ static int ssdgs__gaussian_box(const ssdgs_placed *o, int index, ssdgs_real fain
     return 1;
 }
 
+/* Adds a box of some Gaussians, and the sum of their log scales. */
+static void ssdgs__bounds_add(ssdgs__bounds *b, const double low[3], const double high[3], double log_scale,
+                              int count) {
+    for (int c = 0; c < 3 && count; c++) {
+        b->low[c] = b->count && b->low[c] < low[c] ? b->low[c] : low[c];
+        b->high[c] = b->count && b->high[c] > high[c] ? b->high[c] : high[c];
+    }
+    b->log_scale += log_scale;
+    b->count += count;
+}
+
 typedef struct ssdgs__bounds_job {
     const ssdgs_frame *frame;
     ssdgs__bounds *chunk;
@@ -3702,22 +3674,12 @@ static void ssdgs__bounds_task(void *data, int index) {
     ssdgs__bounds *b = job->chunk + index;
     ssdgs__piece piece;
     const int end = ssdgs__chunk_end(frame, index);
-    for (int j = 0; j < 3; j++) {
-        b->low[j] = 1e30;
-        b->high[j] = -1e30;
-    }
-    b->log_scale = 0;
-    b->count = 0;
+    memset(b, 0, sizeof *b);
     for (int at = index * SSDGS__CHUNK; ssdgs__piece_next(frame, &at, end, &piece);)
         for (int i = piece.begin; i < piece.end; i++) {
             double low[3], high[3], log_scale;
-            if (!ssdgs__gaussian_box(piece.object, i, job->faint, low, high, &log_scale)) continue;
-            b->log_scale += log_scale;
-            b->count++;
-            for (int j = 0; j < 3; j++) {
-                b->low[j] = low[j] < b->low[j] ? low[j] : b->low[j];
-                b->high[j] = high[j] > b->high[j] ? high[j] : b->high[j];
-            }
+            if (ssdgs__gaussian_box(piece.object, i, job->faint, low, high, &log_scale))
+                ssdgs__bounds_add(b, low, high, log_scale, 1);
         }
 }
 
@@ -3767,22 +3729,12 @@ static ssdgs_result ssdgs__scene_bounds(const ssdgs_frame *frame, ssdgs__bounds 
     job.faint = threshold > 1e-9 ? (ssdgs_real)log(threshold) : -21; /* below the logit, by little */
     ssdgs__parallel(context, chunks, ssdgs__bounds_task, &job);
     memset(total, 0, sizeof *total);
-    for (int i = 0; i < chunks; i++) {
-        const ssdgs__bounds *b = job.chunk + i;
-        if (!b->count) continue;
-        for (int j = 0; j < 3; j++) {
-            if (!total->count || b->low[j] < total->low[j]) total->low[j] = b->low[j];
-            if (!total->count || b->high[j] > total->high[j]) total->high[j] = b->high[j];
-        }
-        total->count += b->count;
-        total->log_scale += b->log_scale;
-    }
+    for (const ssdgs__bounds *b = job.chunk; b < job.chunk + chunks; b++)
+        ssdgs__bounds_add(total, b->low, b->high, b->log_scale, b->count);
     if (total->count) total->log_scale /= total->count;
     ssdgs__cut_strays(frame, job.faint, total);
     return SSDGS_OK;
 }
-
-static void ssdgs__place(const ssdgs_object *object, ssdgs_placed *o);
 
 /* A model in its own space. */
 static ssdgs_object ssdgs__object_alone(ssdgs_model *model) {
@@ -3793,25 +3745,6 @@ static ssdgs_object ssdgs__object_alone(ssdgs_model *model) {
     object.roughness = object.specular = object.translucency = object.presence = 1;
     if (model) object.kept = model->settings.baked ? 1 : model->settings.kept;
     return object;
-}
-
-/* The bounds of a model in its space, of all that is drawn at alpha 1/255. */
-static ssdgs_result ssdgs__bounds_of_model(ssdgs_model *model, ssdgs__bounds *bounds) {
-    ssdgs_context *context = model->context;
-    const ssdgs_object object = ssdgs__object_alone(model);
-    ssdgs_placed placed;
-    ssdgs_frame frame;
-    const ssdgs_result result = ssdgs__scratch_create(context);
-    if (result) return result;
-    ssdgs__place(&object, &placed);
-    memset(&frame, 0, sizeof frame);
-    frame.context = context;
-    frame.scratch = context->scratch;
-    frame.options = ssdgs_render_options_exact();
-    frame.objects = &placed;
-    frame.object_count = 1;
-    frame.count = model->count;
-    return ssdgs__scene_bounds(&frame, bounds);
 }
 
 /* ==== >>lights  what a light reaches, and the views of its map ==== */
@@ -3887,6 +3820,7 @@ static ssdgs__bounds ssdgs__light_bounds(const ssdgs_frame *frame, int index) {
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_placed *o = frame->objects + i;
         const ssdgs__bounds *own = &o->model->bounds;
+        double low[3], high[3];
         if (!reach[i] || !own->count) continue;
         for (int c = 0; c < 3; c++) {
             double at = (double)o->offset[c], half = 0;
@@ -3895,11 +3829,10 @@ static ssdgs__bounds ssdgs__light_bounds(const ssdgs_frame *frame, int index) {
                 at += r * (own->high[j] + own->low[j]) / 2;
                 half += fabs(r) * (own->high[j] - own->low[j]) / 2;
             }
-            b.low[c] = b.count && b.low[c] < at - half ? b.low[c] : at - half;
-            b.high[c] = b.count && b.high[c] > at + half ? b.high[c] : at + half;
+            low[c] = at - half;
+            high[c] = at + half;
         }
-        b.log_scale += (own->log_scale + log((double)o->scale)) * own->count;
-        b.count += own->count;
+        ssdgs__bounds_add(&b, low, high, (own->log_scale + log((double)o->scale)) * own->count, own->count);
     }
     if (b.count) b.log_scale /= b.count;
     return b;
@@ -4060,9 +3993,8 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "render options: not made by ssdgs_render_options_default()");
-    const ssdgs_result result =
-        ssdgs__numbers_check(context, "render options", ssdgs__render_numbers, SSDGS__RENDER_NUMBERS, o);
-    if (result) return result;
+    SSDGS__TRY(
+        ssdgs__numbers_check(context, "render options", ssdgs__render_numbers, SSDGS__RENDER_NUMBERS, o));
     for (int i = 0; i < 3; i++)
         if (!ssdgs__finite(o->background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "render options: background[%d] is not finite",
@@ -4076,26 +4008,9 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
 
 SSDGS__SMALL_END
 
-/* Whether an object's pixels are lit, not its Gaussians. */
-static int ssdgs__is_deferred(const ssdgs_placed *o) {
-    return o->settings.asg == SSDGS_ASG_DEFERRED && o->light_count;
-}
-
 /* Whether an object scatters what comes to it by true dipole transport. */
 static int ssdgs__has_transport(const ssdgs_placed *o) {
     return (o->terms & SSDGS_SCATTERING_TERM) && o->settings.transport && o->light_count;
-}
-
-/* Whether something in the frame needs the lights' maps. */
-static int ssdgs__needs_light(const ssdgs_frame *frame) {
-    if (frame->maps) return 1;
-    for (int i = 0; i < frame->object_count; i++) {
-        const ssdgs_placed *o = frame->objects + i;
-        if (!o->light_count) continue;
-        if (o->terms & SSDGS_SHADOW_TERM) return 1;
-        if ((o->terms & SSDGS_SCATTERING_TERM) && (o->settings.depth_cue || o->settings.transport)) return 1;
-    }
-    return 0;
 }
 
 /* Whether walks are to leave maps for pixels and for who asks. */
@@ -4260,15 +4175,18 @@ static int ssdgs__lit_alike(const ssdgs__lighting *a, const ssdgs__lighting *b, 
            a->residual_shadow == b->residual_shadow;
 }
 
-/* Fills the table, objects first. Objects that pixels light alike share a material. */
+/* Fills the table, objects first. Objects that pixels light alike share a material; notes that of each 64
+   Gaussians, unless all have one. */
 static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const int lights = frame->light_count;
     ssdgs__lighting *table, *pixels;
+    uint16_t *of;
     ssdgs_real taken = 0;
     for (int light = 0; light < lights; light++) taken += frame->lights[light].kept;
     SSDGS__RESERVE(frame->scratch->lightings, table, ssdgs__lighting,
                    ssdgs__times(2 * ((size_t)frame->object_count + 1), (size_t)lights + 1));
+    SSDGS__RESERVE(frame->memory->material_of, of, uint16_t, (size_t)frame->count / SSDGS__BLOCK + 1);
     pixels = table + frame->object_count * (ptrdiff_t)(lights + 1);
     frame->material_count = 0;
     for (int i = 0; i < frame->object_count; i++) {
@@ -4285,12 +4203,15 @@ static ssdgs_result ssdgs__light_table(ssdgs_frame *frame) {
         if (!lights) continue;
         for (o->material = 0; o->material < frame->material_count; o->material++)
             if (ssdgs__lit_alike(pixels + o->material * (ptrdiff_t)lights, own, lights)) break;
+        for (int g = 0; g < o->gaussians.count; g += SSDGS__BLOCK)
+            of[(o->first + g) / SSDGS__BLOCK] = (uint16_t)o->material;
         if (o->material < frame->material_count) continue;
         for (int light = 0; light < lights; light++)
             pixels[frame->material_count * (ptrdiff_t)lights + light] =
                 ssdgs__lighting_of(frame, &world, light, own);
         frame->material_count++;
     }
+    frame->material_of = frame->material_count > 1 ? of : NULL;
     return SSDGS_OK;
 }
 
@@ -4343,8 +4264,7 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         ssdgs_placed o, *last = frame->objects + i;
         ssdgs__place(objects + i, &o);
         const int known = last->revision == o.revision; /* that of no model is 0 */
-        const ssdgs_result result = known ? SSDGS_OK : ssdgs__globals_check(o.model);
-        if (result) return result;
+        SSDGS__TRY(known ? SSDGS_OK : ssdgs__globals_check(o.model));
         if (known && !memcmp(&last->translucency, &o.translucency, sizeof o.translucency))
             memcpy(o.medium, last->medium, sizeof o.medium);
         else if (ssdgs__has_medium(&o.settings, o.settings.terms))
@@ -4388,20 +4308,6 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
     return SSDGS_OK;
 }
 
-/* Notes the material of each 64 Gaussians; NULL if all have one. */
-static ssdgs_result ssdgs__materials(ssdgs_frame *frame) {
-    ssdgs_context *context = frame->context;
-    uint16_t *of;
-    SSDGS__RESERVE(frame->memory->material_of, of, uint16_t, (size_t)frame->count / SSDGS__BLOCK + 1);
-    for (int i = 0; i < frame->object_count; i++) {
-        const ssdgs_placed *o = frame->objects + i;
-        for (int g = 0; g < o->gaussians.count; g += SSDGS__BLOCK)
-            of[(o->first + g) / SSDGS__BLOCK] = (uint16_t)o->material;
-    }
-    frame->material_of = frame->material_count > 1 ? of : NULL;
-    return SSDGS_OK;
-}
-
 /* What a frame is to show. */
 typedef struct ssdgs__request {
     const ssdgs_object *objects;
@@ -4420,14 +4326,8 @@ typedef struct ssdgs__request {
 static ssdgs__request ssdgs__request_of(const ssdgs_object *objects, int object_count,
                                         const ssdgs_camera *camera, const ssdgs_light *lights,
                                         int light_count, const ssdgs_render_options *options) {
-    ssdgs__request request;
-    memset(&request, 0, sizeof request);
-    request.objects = objects;
-    request.object_count = object_count;
-    request.camera = camera;
-    request.lights = lights;
-    request.light_count = light_count;
-    request.options = options;
+    const ssdgs__request request = {
+        objects, object_count, camera, lights, light_count, options, NULL, 0, 0, 0, 0, NULL};
     return request;
 }
 
@@ -4436,11 +4336,24 @@ static int ssdgs__components_asked(const ssdgs_image *image) {
            image->depth;
 }
 
-/* Finds the boxes of an object's model: one holds all that its Gaussians draw, to 3.4 standard deviations. */
+/* Finds the boxes of an object's model, in its space: the bounds of all that is drawn at alpha 1/255; and one
+   holds all that its Gaussians draw, to 3.4 standard deviations. */
 static ssdgs_result ssdgs__model_box(ssdgs_model *model) {
     if (model->box_revision == model->revision) return SSDGS_OK;
-    const ssdgs_result result = ssdgs__bounds_of_model(model, &model->bounds);
-    if (result) return result;
+    ssdgs_context *context = model->context;
+    const ssdgs_object object = ssdgs__object_alone(model);
+    ssdgs_placed placed;
+    ssdgs_frame frame;
+    SSDGS__TRY(ssdgs__scratch_create(context));
+    ssdgs__place(&object, &placed);
+    memset(&frame, 0, sizeof frame);
+    frame.context = context;
+    frame.scratch = context->scratch;
+    frame.options = ssdgs_render_options_exact();
+    frame.objects = &placed;
+    frame.object_count = 1;
+    frame.count = model->count;
+    SSDGS__TRY(ssdgs__scene_bounds(&frame, &model->bounds));
     model->box_revision = model->revision;
     int any = 0;
     for (int i = 0; i < model->count; i++) {
@@ -4513,8 +4426,7 @@ static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame) {
         ssdgs_placed *o = frame->objects + i;
         const ssdgs_model *model = o->model;
         double half2 = 0;
-        const ssdgs_result result = several ? ssdgs__model_box(o->model) : SSDGS_OK;
-        if (result) return result;
+        SSDGS__TRY(several ? ssdgs__model_box(o->model) : SSDGS_OK);
         for (int c = 0; c < 3; c++) {
             const double half = (model->high[c] - model->low[c]) / 2;
             half2 += half * half;
@@ -4595,9 +4507,7 @@ static void ssdgs__begin_camera(ssdgs_frame *frame) {
 static ssdgs_result ssdgs__views_reserve(ssdgs_frame *frame, int count) {
     ssdgs_context *context = frame->context;
     ssdgs__frame_memory *m = frame->memory;
-    const ssdgs_result result =
-        ssdgs__grow(context, &m->view_memory, (size_t)count, sizeof(ssdgs__view_memory));
-    if (result) return result;
+    SSDGS__TRY(ssdgs__grow(context, &m->view_memory, (size_t)count, sizeof(ssdgs__view_memory)));
     SSDGS__KEEP(m->views, frame->views, ssdgs_splat_view, count);
     frame->view_count = frame->batch[1] = count;
     return SSDGS_OK;
@@ -4611,8 +4521,7 @@ static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted
     ssdgs_real place[3];
     own->first = frame->view_count;
     own->views = ssdgs__light_views(frame, index, views);
-    const ssdgs_result result = ssdgs__views_reserve(frame, own->first + own->views);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__views_reserve(frame, own->first + own->views));
     ssdgs__light_place(light, place);
     uint64_t key = ssdgs__views_key(frame, index, views, own->views);
     SSDGS__FOLD(key, light->kind);
@@ -4620,11 +4529,7 @@ static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted
     SSDGS__FOLD(key, own->first);
     SSDGS__FOLD(key, frame->options.stop);
     SSDGS__FOLD(key, frame->bias);
-    if (frame->occluder) {
-        SSDGS__FOLD(key, frame->occluder->shadow);
-        SSDGS__FOLD(key, frame->occluder->user);
-        SSDGS__FOLD(key, frame->occluder->revision);
-    }
+    if (frame->occluder) SSDGS__FOLD(key, *frame->occluder);
     own->wanted = ssdgs__casts(light) ? wanted : 0;
     own->kept = key == own->key && !(own->wanted & ~own->made);
     own->key = key;
@@ -4645,19 +4550,18 @@ static ssdgs_result ssdgs__begin_views(ssdgs_frame *frame, int wanted, int looks
     ssdgs__light_memory *lights;
     const int light_count = wanted ? frame->light_count : 0;
     SSDGS__KEEP(m->lights, lights, ssdgs__light_memory, frame->light_count + 1);
-    ssdgs_result result = ssdgs__views_reserve(frame, 1);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__views_reserve(frame, 1));
     frame->views->light = -1;
     frame->views->cached = 2;
     if (looks) ssdgs__begin_camera(frame);
     if (!light_count) return SSDGS_OK;
     const uint64_t key = ssdgs__objects_key(frame, NULL);
-    if (key != m->bounds_key) result = ssdgs__scene_bounds(frame, &m->scene);
+    if (key != m->bounds_key) SSDGS__TRY(ssdgs__scene_bounds(frame, &m->scene));
     m->bounds_key = key;
     /* those behind may lose their views to others */
     memset(lights + light_count, 0, m->lights.bytes - (size_t)light_count * sizeof *lights);
-    for (int i = 0; i < light_count && !result; i++) result = ssdgs__begin_light(frame, i, wanted);
-    return result;
+    for (int i = 0; i < light_count; i++) SSDGS__TRY(ssdgs__begin_light(frame, i, wanted));
+    return SSDGS_OK;
 }
 
 /* Forgets what earlier frames have found. */
@@ -4670,23 +4574,24 @@ static void ssdgs__frame_forget(ssdgs__frame_memory *m) {
 /* Checks a request, places its objects, reserves memory, finds what is there from earlier frames. */
 static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *context,
                                        ssdgs__frame_memory **memory, const ssdgs__request *request) {
-    const ssdgs_camera nobody = ssdgs__no_camera(), *camera = request->camera ? request->camera : &nobody;
+    static const ssdgs_real eye[3] = {0, 0, 0}, ahead[3] = {0, 1, 0}, up[3] = {0, 0, 1};
+    const ssdgs_camera nobody = ssdgs_camera_look_at(eye, ahead, up, 1, 16, 16),
+                       *camera = request->camera ? request->camera : &nobody;
     const ssdgs_image *image = request->image;
     const int light_count = request->light_count, training = request->training;
     const int components = request->components || (image && ssdgs__components_asked(image));
     ssdgs__frame_memory *m;
     ssdgs__scratch *w;
     if (!*memory) *memory = (ssdgs__frame_memory *)ssdgs__allocate(context, sizeof *m);
-    ssdgs_result result = ssdgs__scratch_create(context);
-    if (!*memory || result) return SSDGS_ERR_MEMORY;
+    SSDGS__TRY(ssdgs__scratch_create(context));
+    if (!*memory) return SSDGS_ERR_MEMORY;
     m = *memory;
     w = context->scratch;
     memset(frame, 0, sizeof *frame);
     frame->options = request->options ? *request->options : ssdgs_render_options_default();
-    result = ssdgs__render_options_check(context, &frame->options);
-    if (!result) result = ssdgs__camera_check(context, camera, request->mirrored);
-    if (!result) result = ssdgs__lights_check(context, request->lights, light_count);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__render_options_check(context, &frame->options));
+    SSDGS__TRY(ssdgs__camera_check(context, camera, request->mirrored));
+    SSDGS__TRY(ssdgs__lights_check(context, request->lights, light_count));
     frame->stride = image && image->stride ? image->stride : camera->width;
     SSDGS__REFUSE(frame->stride < camera->width, "image: stride = %d is below the width of %d", frame->stride,
                   camera->width);
@@ -4697,7 +4602,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     frame->scratch = w;
     frame->camera = *camera;
     frame->lights = request->lights;
-    frame->occluder = request->occluder;
+    frame->occluder = request->occluder && request->occluder->shadow ? request->occluder : NULL;
     frame->maps = request->maps;
     frame->light_count = request->maps ? light_count : 0;
     frame->training = training;
@@ -4709,11 +4614,11 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
                           camera->view[8 + i] * camera->view[11]);
     if (!m->ready || training) ssdgs__frame_forget(m);
     m->ready = m->mapped = 0; /* again once the walks are done */
-    result = ssdgs__place_all(frame, request->objects, request->object_count, request->lights, light_count);
-    for (int i = 0; !result && ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
-        result = ssdgs__sky_shares_of(frame->objects + i);
-    if (!result) result = ssdgs__find_reach(frame);
-    if (result) return result;
+    SSDGS__TRY(
+        ssdgs__place_all(frame, request->objects, request->object_count, request->lights, light_count));
+    for (int i = 0; ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
+        SSDGS__TRY(ssdgs__sky_shares_of(frame->objects + i));
+    SSDGS__TRY(ssdgs__find_reach(frame));
     const size_t n = (size_t)frame->count + SSDGS__BLOCK;
     if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     memset(m->counts, 0, sizeof m->counts);
@@ -4721,12 +4626,14 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     SSDGS__KEEP(m->seen, frame->seen, unsigned char, n);
     const size_t lit = ssdgs__times(n, (size_t)frame->light_count);
     SSDGS__KEEP(m->visibility, frame->visibility, ssdgs_real, lit);
-    int deferred = 0, cue = 0, transport = 0;
+    int deferred = 0, cue = 0, transport = 0, mapped = frame->maps; /* 1: lights need maps */
     for (int i = 0; i < frame->object_count; i++) {
         const ssdgs_placed *o = frame->objects + i;
-        deferred |= ssdgs__is_deferred(o);
-        cue |= (o->terms & SSDGS_SCATTERING_TERM) && o->settings.depth_cue;
+        deferred |= o->settings.asg == SSDGS_ASG_DEFERRED && o->light_count; /* its pixels are lit */
+        const int cued = (o->terms & SSDGS_SCATTERING_TERM) && o->settings.depth_cue;
+        cue |= cued;
         transport |= ssdgs__has_transport(o);
+        mapped |= o->light_count && ((o->terms & SSDGS_SHADOW_TERM) || cued);
     }
     if (cue) SSDGS__KEEP(m->cue, frame->depth_cue, ssdgs_real, lit);
     if (transport) SSDGS__KEEP(m->flux, frame->flux, ssdgs_real, lit);
@@ -4763,13 +4670,12 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
         SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, frame->model->global_count);
     }
-    const int wanted = !ssdgs__needs_light(frame)
+    const int wanted = !(mapped | transport)
                            ? 0
                            : SSDGS__MADE_VISIBILITY | (ssdgs__wants_maps(frame) ? SSDGS__MADE_MAP : 0) |
                                  (cue ? SSDGS__MADE_CUE : 0) | (transport ? SSDGS__MADE_FLUX : 0);
-    result = ssdgs__light_table(frame);
-    if (!result) result = ssdgs__materials(frame);
-    return result ? result : ssdgs__begin_views(frame, wanted, request->camera != NULL);
+    SSDGS__TRY(ssdgs__light_table(frame));
+    return ssdgs__begin_views(frame, wanted, request->camera != NULL);
 }
 
 /* Begins a frame of one model, in its space and memory. */
@@ -4946,8 +4852,7 @@ static ssdgs_result ssdgs__sort(ssdgs_frame *frame) {
         if (frame->views[i].cached) continue;
         SSDGS__RESERVE(m->order, frame->views[i].order, uint32_t, n + 1);
     }
-    const ssdgs_result result = ssdgs__bin_reserve(frame);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__bin_reserve(frame));
     ssdgs__parallel(context, frame->batch[1] - frame->batch[0], ssdgs__sort_task, frame);
     return SSDGS_OK;
 }
@@ -5085,8 +4990,7 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
     ssdgs_context *context = frame->context;
     const size_t n = (size_t)frame->count;
     const int views = frame->batch[1] - frame->batch[0], tasks = views * SSDGS__BIN_CHUNKS;
-    const ssdgs_result result = ssdgs__bin_reserve(frame); /* a hook may have sorted */
-    if (result) return result;
+    SSDGS__TRY(ssdgs__bin_reserve(frame)); /* a hook may have sorted */
     ssdgs__parallel(context, tasks, ssdgs__bin_room_task, frame);
     for (int i = frame->batch[0]; i < frame->batch[1]; i++) {
         ssdgs_splat_view *v = frame->views + i;
@@ -5381,11 +5285,8 @@ static ssdgs__node ssdgs__node_of(const ssdgs_frame *frame, const ssdgs_placed *
     const ssdgs_model_view *g = &o->gaussians;
     const ssdgs_real *x = g->gaussians + (size_t)SSDGS_POSITION * g->stride + i;
     const ssdgs_real area = frame->lights[light].kind == SSDGS_LIGHT_DIRECTIONAL ? o->scale * o->scale : 1;
-    const ssdgs__node node = {{x[0], x[g->stride], x[2 * g->stride]},
-                              frame->flux[(size_t)frame->count * (size_t)light + (size_t)o->first + i] / area,
-                              0,
-                              0,
-                              1};
+    const ssdgs_real flux = frame->flux[(size_t)frame->count * (size_t)light + (size_t)o->first + i] / area;
+    const ssdgs__node node = {{x[0], x[g->stride], x[2 * g->stride]}, flux, 0, 0, 1};
     return node;
 }
 
@@ -5773,8 +5674,7 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
         memset(job.known + (size_t)i * (size_t)job.blocks, 0, (size_t)job.blocks);
         lights[i].transport_key = casts ? key : 0;
     }
-    const ssdgs_result result = ssdgs__nodes(frame, &job.tree);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__nodes(frame, &job.tree));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__transport_task, &job);
     *sums = job.sums;
     return SSDGS_OK;
@@ -5793,9 +5693,8 @@ typedef struct ssdgs__block_layout {
         widest;
     size_t rows, visibility, cue, transport, shadow_at, scattering_at, light_size; /* within a light's part */
     size_t gauss, lights, size;                                                    /* within the block */
-    size_t inputs, outs, lobe, kept, harmonics; /* scratch of both directions */
-    size_t dgauss, drows, dnet, dnet2, transposed, dcolor, ddiffuse, dspecular, dvisibility,
-        scratch; /* and of the backward */
+    size_t inputs, outs, lobe, kept, harmonics;             /* scratch of both directions */
+    size_t dgauss, drows, dnet, dnet2, transposed, scratch; /* and of the backward */
 } ssdgs__block_layout;
 
 /* Rows of all layers' outputs. */
@@ -5832,11 +5731,7 @@ static ssdgs__block_layout ssdgs__layout(const ssdgs_frame *frame, const ssdgs_p
     l.dgauss = l.harmonics +
                b * (o->kept > 0 ? (size_t)(o->gaussians.channels - ssdgs__kept_plane(&o->settings)) : 0);
     l.drows = l.dgauss + b * SSDGS_CHANNELS;
-    l.dcolor = l.drows + b * SSDGS__ROWS;
-    l.ddiffuse = l.dcolor + b * 3;
-    l.dspecular = l.ddiffuse + b * 3;
-    l.dvisibility = l.dspecular + b * 3;
-    l.dnet = l.dvisibility + b;
+    l.dnet = l.drows + b * SSDGS__ROWS;
     l.dnet2 = l.dnet + b * (size_t)(l.widest + 1);
     l.transposed = l.dnet2 + b * (size_t)(l.widest + 1);
     l.scratch = l.transposed + b * (size_t)(l.widest + 32);
@@ -6711,8 +6606,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         frame->shaded[frame->shaded_count++] = (uint32_t)skipped;
     }
     ssdgs__shade_job job;
-    ssdgs_result result = ssdgs__shade_setup(frame, &job);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__shade_setup(frame, &job));
     SSDGS__RESERVE(frame->scratch->activations, job.activations, ssdgs_real,
                    job.size * (size_t)(frame->training ? job.blocks + 1 : SSDGS__SLOTS));
     int transport = 0, shadows = 0;
@@ -6731,10 +6625,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         }
     }
     job.counts = frame->memory->counts;
-    if (transport) {
-        result = ssdgs__transport(frame, &job.transport);
-        if (result) return result;
-    }
+    if (transport) SSDGS__TRY(ssdgs__transport(frame, &job.transport));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
     return SSDGS_OK;
 }
@@ -6793,12 +6684,11 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
     const ssdgs__kernels *k = frame->context->k;
     const ssdgs_real *memory = job->activations + l->size * (size_t)block, *gauss = memory + l->gauss;
     ssdgs_real *scratch = job->scratch + l->scratch * (size_t)slot, *inputs = scratch + l->inputs;
-    ssdgs_real *dgauss = scratch + l->dgauss, *drows = scratch + l->drows, *dcolor = scratch + l->dcolor;
-    ssdgs_real *dvisibility = scratch + l->dvisibility, *dnet = scratch + l->dnet,
-               *dnet2 = scratch + l->dnet2;
+    ssdgs_real *dgauss = scratch + l->dgauss, *drows = scratch + l->drows, *dlobe = scratch + l->lobe;
+    ssdgs_real *dnet = scratch + l->dnet, *dnet2 = scratch + l->dnet2;
+    ssdgs_real dcolor[3 * SSDGS__BLOCK], ddiffuse[3 * SSDGS__BLOCK], dspecular[3 * SSDGS__BLOCK],
+        dresidual[3 * SSDGS__BLOCK], dvisibility[SSDGS__BLOCK];
     ssdgs_real *slot_gradient = job->slots + job->slot_stride * (size_t)slot;
-    ssdgs_real *dspecular = scratch + l->dspecular, *ddiffuse = scratch + l->ddiffuse,
-               *dlobe = scratch + l->lobe;
     ssdgs_real *dshadow = scratch + l->transposed - SSDGS__BLOCK;
     const int live = job->block[block].live;
     memset(dgauss, 0, SSDGS_CHANNELS * SSDGS__BLOCK * sizeof *dgauss);
@@ -6817,7 +6707,6 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         memset(dlobe + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK, 0,
                SSDGS__BLOCK * sizeof *dlobe); /* softness is every light's */
     }
-    ssdgs_real dresidual[3 * SSDGS__BLOCK];
     const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, frame->gaussians.scattering};
     const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, frame->gaussians.shadow};
     const ssdgs__network_scratch backward = {dnet, dnet2, scratch + l->transposed};
@@ -6848,14 +6737,8 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
             for (int s = 0; s < SSDGS__BLOCK; s++)
                 dlobe[SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s] += dresidual[2 * SSDGS__BLOCK + s];
         }
-        const ssdgs__colour_gradient out = {dcolor,
-                                            deferred ? ddiffuse : dcolor,
-                                            deferred ? dspecular : dcolor,
-                                            dgauss,
-                                            drows,
-                                            dshadow,
-                                            dnet,
-                                            dvisibility};
+        const ssdgs_real *dd = deferred ? ddiffuse : dcolor, *ds = deferred ? dspecular : dcolor;
+        const ssdgs__colour_gradient out = {dcolor, dd, ds, dgauss, drows, dshadow, dnet, dvisibility};
         k->colour_backward(lighting, &in, &out);
         for (int s = 0; deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
@@ -6931,8 +6814,7 @@ static SSDGS__TRAINING ssdgs_result ssdgs__shade_backward(ssdgs_frame *frame) {
     const size_t n = frame->gaussians.stride * SSDGS_CHANNELS,
                  lanes = (size_t)SSDGS__LANE_SUMS * (size_t)lights;
     ssdgs__shade_job job;
-    const ssdgs_result result = ssdgs__shade_setup(frame, &job);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__shade_setup(frame, &job));
     const ssdgs__block_layout *l = job.layouts;
     job.slot_shadow = ssdgs__slot_gradient_size(l->scattering, l->scattering_layers);
     job.slot_stride = job.slot_shadow + ssdgs__slot_gradient_size(l->shadow, l->shadow_layers);
@@ -7150,14 +7032,6 @@ static void ssdgs__light_tile(const ssdgs_frame *frame, const ssdgs__tile *tile,
     ssdgs__tile_store(tile, visibility + 16 * given, 2 - given, 0, planes + given);
 }
 
-/* [micro-tile][16 lanes] to the plane. */
-static void ssdgs__median_store(const ssdgs_frame *frame, const ssdgs__tile *tile) {
-    ssdgs_real values[SSDGS__TILE_LAYER], *const planes[1] = {frame->median_depth};
-    for (int micro = 0; micro < 16; micro++)
-        memcpy(values + 64 * micro, tile->median + 16 * micro, 16 * sizeof *values);
-    ssdgs__tile_store(tile, values, 1, 0, planes);
-}
-
 /* Whether a light reaches any of the objects that a tile blends. */
 static int ssdgs__reaches_tile(const ssdgs_frame *frame, const ssdgs__tile *tile, int light) {
     const unsigned char *reach = ssdgs__reach(frame, light);
@@ -7181,7 +7055,7 @@ static void ssdgs__composite_task(void *data, int index) {
     for (int y = tile.y; y < tile.y + 16 && y < tile.height; y++) /* to be near once it is stored */
         for (int c = 0; c < 4; c++)
             SSDGS__PREFETCH(job->planes[c] + (size_t)y * (size_t)tile.width + (size_t)tile.x);
-    ssdgs_real scene_depth[256], median[256];
+    ssdgs_real scene_depth[256], median[SSDGS__TILE_LAYER];
     ssdgs__tile_scene_depth(frame, &tile, scene_depth);
     if (job->color == frame->color && frame->median_depth) {
         memset(median, 0, sizeof median);
@@ -7191,7 +7065,7 @@ static void ssdgs__composite_task(void *data, int index) {
     tile.material = ssdgs__material_after(&tile, -1);
     for (int later = 0; tile.material >= 0; later = 1) {
         frame->context->k->composite(&tile, layers, color, pixels);
-        if (tile.median) ssdgs__median_store(frame, &tile);
+        if (tile.median) ssdgs__tile_store(&tile, median, 1, 0, &frame->median_depth);
         tile.median = NULL;
         if (frame->layer_count && layers == 1)
             memset(pixels + SSDGS__TILE_LAYER, 0, sizeof pixels - SSDGS__TILE_LAYER * sizeof *pixels);
@@ -7208,18 +7082,10 @@ static void ssdgs__composite_task(void *data, int index) {
 /* Blends color, any triple per Gaussian; where deferred, the layers too, and lights what they blend to. */
 static void ssdgs__composite_tiles(const ssdgs_frame *frame, const ssdgs_real *color, ssdgs_real *pixels) {
     const size_t plane = (size_t)frame->camera.width * (size_t)frame->camera.height;
-    ssdgs__composite_job job;
-    job.frame = frame;
-    job.color = color;
-    for (int c = 0; c < 3; c++) job.planes[c] = pixels + plane * (size_t)c;
-    job.planes[3] = frame->transmittance;
+    ssdgs__composite_job job = {
+        frame, color, {pixels, pixels + plane, pixels + 2 * plane, frame->transmittance}};
     ssdgs__parallel(frame->context, frame->views[0].tiles_x * frame->views[0].tiles_y, ssdgs__composite_task,
                     &job);
-}
-
-static ssdgs_result ssdgs__composite(ssdgs_frame *frame) {
-    ssdgs__composite_tiles(frame, frame->color, frame->pixels);
-    return SSDGS_OK;
 }
 
 typedef struct ssdgs__uncomposite_job {
@@ -7461,7 +7327,7 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
     case SSDGS_STAGE_BIN: return ssdgs__bin(frame);
     case SSDGS_STAGE_WALK: return ssdgs__walk(frame);
     case SSDGS_STAGE_SHADE: return ssdgs__shade(frame);
-    case SSDGS_STAGE_COMPOSITE: return ssdgs__composite(frame);
+    case SSDGS_STAGE_COMPOSITE: return ssdgs__composite_tiles(frame, frame->color, frame->pixels), SSDGS_OK;
 #ifndef SSDGS_NO_TRAINER
     case SSDGS_STAGE_COMPOSITE_BACKWARD: return ssdgs__composite_backward(frame);
     case SSDGS_STAGE_SHADE_BACKWARD: return ssdgs__shade_backward(frame);
@@ -7534,41 +7400,34 @@ typedef struct ssdgs__rows_job {
     const ssdgs_frame *frame;
     const ssdgs_real *planes;
     ssdgs_real *out, background[3];
-    int channels, stride;
+    int channels;
 } ssdgs__rows_job;
 
 static void ssdgs__rows_task(void *data, int index) {
     const ssdgs__rows_job *job = (const ssdgs__rows_job *)data;
-    const ssdgs_real *transmittance = job->frame->transmittance;
     const int w = job->frame->camera.width, h = job->frame->camera.height, n = job->channels;
     const int end = (index + 1) * SSDGS__BAND < h ? (index + 1) * SSDGS__BAND : h;
-    const size_t plane = (size_t)w * (size_t)h;
+    const size_t plane = (size_t)w * (size_t)h, stride = (size_t)job->frame->stride;
     for (int y = index * SSDGS__BAND; y < end; y++) {
-        const ssdgs_real *t = transmittance + (size_t)y * (size_t)w,
+        const ssdgs_real *t = job->frame->transmittance + (size_t)y * (size_t)w,
                          *red = job->planes ? job->planes + (size_t)y * (size_t)w : NULL;
-        ssdgs_real *rgb = job->out + (size_t)y * (size_t)job->stride * 3;
+        ssdgs_real *rgb = job->out + (size_t)y * stride * 3;
         for (int x = 0; n == 3 && x < w; x++, rgb += 3) {
             rgb[0] = red[x] + t[x] * job->background[0];
             rgb[1] = red[plane + (size_t)x] + t[x] * job->background[1];
             rgb[2] = red[2 * plane + (size_t)x] + t[x] * job->background[2];
         }
         for (int x = 0; n == 1 && x < w; x++)
-            job->out[(size_t)y * (size_t)job->stride + (size_t)x] =
-                (job->planes ? red[x] : 1) + t[x] * job->background[0];
+            job->out[(size_t)y * stride + (size_t)x] = (job->planes ? red[x] : 1) + t[x] * job->background[0];
     }
 }
 
 /* Planes, one or three, to the caller's rows: out[y][x][c] = plane_c + transmittance x background_c. A plane
    of NULL is 1. */
-static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels, int stride,
+static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels,
                               const ssdgs_real *background, ssdgs_real *out) {
-    ssdgs__rows_job job;
-    job.frame = frame;
-    job.planes = planes;
-    job.out = out;
-    job.channels = channels;
-    job.stride = stride;
-    for (int c = 0; c < 3; c++) job.background[c] = background ? background[c] : 0;
+    ssdgs__rows_job job = {frame, planes, out, {0, 0, 0}, channels};
+    if (background) memcpy(job.background, background, sizeof job.background);
     ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task,
                     &job);
 }
@@ -7647,17 +7506,13 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
 static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, ssdgs_render_stats *stats) {
     ssdgs_context *context = frame->context;
     const ssdgs_camera *camera = &frame->camera;
-    const int stride = frame->stride;
     frame->statistics = stats != NULL;
-    const ssdgs_result result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE));
     const size_t pixels = (size_t)camera->width * (size_t)camera->height;
-    if (image->color)
-        ssdgs__write_rows(frame, frame->pixels, 3, stride, frame->options.background, image->color);
-    if (image->median_depth)
-        ssdgs__write_rows(frame, frame->median_depth, 1, stride, NULL, image->median_depth);
+    if (image->color) ssdgs__write_rows(frame, frame->pixels, 3, frame->options.background, image->color);
+    if (image->median_depth) ssdgs__write_rows(frame, frame->median_depth, 1, NULL, image->median_depth);
     static const ssdgs_real less[3] = {-1, 0, 0};
-    if (image->alpha) ssdgs__write_rows(frame, NULL, 1, stride, less, image->alpha);
+    if (image->alpha) ssdgs__write_rows(frame, NULL, 1, less, image->alpha);
     ssdgs_real *planes = NULL;
     if (ssdgs__components_asked(image)) SSDGS__RESERVE(frame->scratch->image, planes, ssdgs_real, pixels * 3);
     for (int c = 0; c < 4; c++) {
@@ -7666,13 +7521,13 @@ static ssdgs_result ssdgs__render(ssdgs_frame *frame, const ssdgs_image *image, 
         if (!to[c]) continue;
         if (frame->layer_count) ssdgs__deferred_component(frame, c, planes);
         else ssdgs__composite_tiles(frame, from[c], planes);
-        ssdgs__write_rows(frame, planes, 3, stride, NULL, to[c]);
+        ssdgs__write_rows(frame, planes, 3, NULL, to[c]);
     }
     if (image->shadow || image->depth) {
         if (frame->layer_count) ssdgs__deferred_component(frame, 4, planes);
         else ssdgs__composite_tiles(frame, frame->shadow, planes);
-        if (image->shadow) ssdgs__write_rows(frame, planes, 1, stride, NULL, image->shadow);
-        if (image->depth) ssdgs__write_rows(frame, planes + pixels, 1, stride, NULL, image->depth);
+        if (image->shadow) ssdgs__write_rows(frame, planes, 1, NULL, image->shadow);
+        if (image->depth) ssdgs__write_rows(frame, planes + pixels, 1, NULL, image->depth);
     }
     if (stats) ssdgs__render_statistics(frame, stats);
     return SSDGS_OK;
@@ -7720,10 +7575,6 @@ struct ssdgs_scene {
     int maps;             /* 1: light maps have been asked for, so every frame makes them */
 };
 
-static const ssdgs_occluder *ssdgs__occluder_of(const ssdgs_scene *scene) {
-    return scene->occluder.shadow ? &scene->occluder : NULL;
-}
-
 SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model) {
     ssdgs_object object = ssdgs__object_alone(model);
     if (model && ssdgs__is_placed(&model->settings))
@@ -7733,9 +7584,7 @@ SSDGS_API ssdgs_object ssdgs_object_default(ssdgs_model *model) {
 
 SSDGS_API ssdgs_result ssdgs_scene_create(ssdgs_context *context, ssdgs_scene **out) {
     if (out) *out = NULL;
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_scene_create");
-    if (result) return result;
+    SSDGS__BEGIN(context, context, "ssdgs_scene_create");
     if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_scene_create", "out"));
     *out = (ssdgs_scene *)ssdgs__allocate(context, sizeof **out);
     if (!*out) return ssdgs__leave(context, SSDGS_ERR_MEMORY);
@@ -7820,17 +7669,16 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
                                           const ssdgs_image *image, ssdgs_render_stats *stats) {
     ssdgs_frame frame;
     if (stats) memset(stats, 0, sizeof *stats);
-    if (!scene) return SSDGS_ERR_ARGUMENT;
+    SSDGS__BEGIN(scene, scene->context, "ssdgs_scene_render");
     ssdgs_context *context = scene->context;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_scene_render");
-    if (result) return result;
+    ssdgs_result result = SSDGS_OK;
     if (!camera || !image) result = ssdgs__null(context, "ssdgs_scene_render", camera ? "image" : "camera");
     if (!result) result = ssdgs__objects_check(context, objects, object_count);
     ssdgs__request request = ssdgs__request_of(objects, object_count, camera, lights, light_count, options);
     request.image = image;
     request.maps = scene->maps;
     request.mirrored = 1;
-    request.occluder = ssdgs__occluder_of(scene);
+    request.occluder = &scene->occluder;
     if (!result) result = ssdgs__choose_levels(scene, &request);
     if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
@@ -7845,24 +7693,20 @@ SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occ
 }
 
 /* Projects, sorts, bins and walks what the lights see; the camera's view stays as it is. */
-static ssdgs_result ssdgs__scene_light(ssdgs_scene *scene, const ssdgs__request *request) {
-    ssdgs_frame frame;
-    ssdgs_result result = ssdgs__objects_check(scene->context, request->objects, request->object_count);
-    if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, request);
-    return result ? result : ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
-}
-
 SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
                                          const ssdgs_light *lights, int light_count,
                                          const ssdgs_render_options *options) {
-    if (!scene) return SSDGS_ERR_ARGUMENT;
-    const ssdgs_result result = SSDGS__ENTER(scene->context, "ssdgs_scene_light");
-    if (result) return result;
+    ssdgs_frame frame;
+    SSDGS__BEGIN(scene, scene->context, "ssdgs_scene_light");
+    ssdgs_result result = SSDGS_OK;
     ssdgs__request request = ssdgs__request_of(objects, object_count, NULL, lights, light_count, options);
     request.maps = scene->maps = 1;
     request.mirrored = 1;
-    request.occluder = ssdgs__occluder_of(scene);
-    return ssdgs__scene_leave(scene, ssdgs__scene_light(scene, &request));
+    request.occluder = &scene->occluder;
+    result = ssdgs__objects_check(scene->context, objects, object_count);
+    if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, &request);
+    if (!result) result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
+    return ssdgs__scene_leave(scene, result);
 }
 
 typedef struct ssdgs__shadow_job {
@@ -7894,19 +7738,14 @@ static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssd
                                         ssdgs_real *fraction) {
     ssdgs_context *context = scene->context;
     const ssdgs__frame_memory *m = scene->frame;
-    ssdgs__shadow_job job;
     SSDGS__REFUSE(count < 0 || (count && (!points || !fraction)),
                   count < 0 ? "%d points" : "%d points, but an array is NULL", count);
     SSDGS__REFUSE(!m || light < 0 || light >= m->mapped,
                   "light %d: ssdgs_scene_light() has made no map of it", light);
     const ssdgs__light_memory *own = (const ssdgs__light_memory *)m->lights.memory + light;
-    job.k = context->k;
-    job.view = (const ssdgs_splat_view *)m->views.memory + own->first;
-    job.end = job.view + (own->wanted ? own->views : 0);
-    job.points = points;
-    job.fraction = fraction;
-    job.bias = m->bias;
-    job.count = count;
+    const ssdgs_splat_view *view = (const ssdgs_splat_view *)m->views.memory + own->first,
+                           *end = view + (own->wanted ? own->views : 0);
+    ssdgs__shadow_job job = {context->k, view, end, points, fraction, m->bias, count};
     ssdgs__parallel(context, ssdgs__chunks(count), ssdgs__shadow_task, &job);
     return SSDGS_OK;
 }
@@ -7971,18 +7810,11 @@ static ssdgs_result ssdgs__sky_shares_of(ssdgs_placed *o) {
     ssdgs_model *model = o->model;
     ssdgs_context *context = model->context;
     if (o->settings.baked) return SSDGS_OK;
-    if (model->sky_share_room < model->capacity) {
-        ssdgs__release(context, model->sky_share);
-        model->sky_share_room = 0;
-        model->sky_share =
-            (ssdgs_real *)ssdgs__allocate(context, 2 * model->capacity * sizeof *model->sky_share);
-        if (!model->sky_share) return SSDGS_ERR_MEMORY;
-        model->sky_share_room = model->capacity;
-        model->sky_share_revision = 0;
-    }
-    o->sky_share = model->sky_share;
+    ssdgs_real *sky_share;
+    SSDGS__RESERVE(model->sky_share, sky_share, ssdgs_real, 2 * model->capacity);
+    o->sky_share = sky_share;
     if (model->sky_share_revision == model->revision) return SSDGS_OK;
-    const ssdgs_result result = ssdgs__sky_shares(model, model->sky_share_room, model->sky_share);
+    const ssdgs_result result = ssdgs__sky_shares(model, model->capacity, sky_share);
     if (!result) model->sky_share_revision = model->revision;
     return result;
 }
@@ -7992,8 +7824,7 @@ static ssdgs_result ssdgs__model_bounds(ssdgs_model *model, ssdgs_real low[3], s
     const ssdgs_object object = ssdgs__object_alone(model);
     ssdgs_placed placed;
     if (!low || !high) return ssdgs__null(context, "ssdgs_model_bounds", low ? "high" : "low");
-    const ssdgs_result result = ssdgs__model_box(model);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__model_box(model));
     const ssdgs__bounds bounds = model->bounds; /* without strays, of balls: too wide */
     ssdgs__place(&object, &placed);
     ssdgs_real least[3] = {0, 0, 0}, most[3] = {0, 0, 0};
@@ -8084,13 +7915,10 @@ static SSDGS__INLINE unsigned char ssdgs__byte(const unsigned char *table, ssdgs
 
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes) {
     if (!values || !bytes) return;
-    if (transfer == SSDGS_TRANSFER_SRGB) {
-        unsigned char table[SSDGS__PARTS];
-        ssdgs__bytes_make(table);
-        for (size_t i = 0; i < count; i++) bytes[i] = ssdgs__byte(table, values[i]);
-    } else {
-        for (size_t i = 0; i < count; i++) bytes[i] = ssdgs__byte(NULL, values[i]);
-    }
+    unsigned char table[SSDGS__PARTS];
+    const int srgb = transfer == SSDGS_TRANSFER_SRGB;
+    if (srgb) ssdgs__bytes_make(table);
+    for (size_t i = 0; i < count; i++) bytes[i] = ssdgs__byte(srgb ? table : NULL, values[i]);
 }
 
 /* IEEE half precision, to the nearest, ties to even. */
@@ -8945,8 +8773,7 @@ static ssdgs_result ssdgs__settings_of_file(ssdgs_context *context, const char *
 static ssdgs_result ssdgs__ply_read_settings(ssdgs__ply *ply, ssdgs_settings *settings) {
     ssdgs__ply_element *element = ply->known[SSDGS__PLY_SETTINGS];
     uint32_t words[SSDGS__PLY_WORDS];
-    const ssdgs_result result = ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, SSDGS__PLY_WORDS);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__ply_require(ply, SSDGS__PLY_SETTINGS, 0, SSDGS__PLY_WORDS));
     ssdgs__ply_cursor cursor;
     for (cursor.field = NULL; ssdgs__ply_next(&cursor, SSDGS__PLY_SETTINGS);)
         words[cursor.word] = ssdgs__ply_bits(cursor.field->before);
@@ -9289,9 +9116,8 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
                                                ssdgs_model **out, ssdgs_load_stats *stats) {
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_load_memory");
-    if (result) return result;
+    SSDGS__BEGIN(context, context, "ssdgs_model_load_memory");
+    ssdgs_result result = SSDGS_OK;
     if (!bytes || !out) result = ssdgs__null(context, "ssdgs_model_load_memory", bytes ? "out" : "bytes");
     else result = ssdgs__ply_load(context, "PLY in memory", bytes, size, out, stats);
     return ssdgs__leave(context, result);
@@ -9357,9 +9183,8 @@ SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path
     unsigned char *bytes = NULL;
     if (stats) memset(stats, 0, sizeof *stats);
     if (out) *out = NULL;
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_model_load");
-    if (result) return result;
+    SSDGS__BEGIN(context, context, "ssdgs_model_load");
+    ssdgs_result result = SSDGS_OK;
     size_t size;
     if (!path || !out) result = ssdgs__null(context, "ssdgs_model_load", path ? "out" : "path");
     else result = ssdgs__read_file(context, path, 0, &bytes, &size);
@@ -10073,8 +9898,7 @@ typedef struct ssdgs__photo_job {
 /* A photograph's lights: `light`, which may be refined, and those beside its own. */
 static ssdgs_result ssdgs__photo_lights(ssdgs_context *context, const ssdgs_photo *photo,
                                         const ssdgs_light *light, ssdgs_light **lights) {
-    const ssdgs_result result = ssdgs__scratch_create(context);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__scratch_create(context));
     SSDGS__RESERVE(context->scratch->photo_lights, *lights, ssdgs_light, photo->more_count + 1);
     **lights = *light;
     if (photo->more_count) memcpy(*lights + 1, photo->more, (size_t)photo->more_count * sizeof *light);
@@ -10426,9 +10250,8 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     const size_t capacity = count <= model->capacity
                                 ? model->capacity
                                 : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
-    size_t bytes;
-    if (!ssdgs__product_fits(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real), &bytes))
-        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
+    const size_t bytes = ssdgs__times(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real));
+    if (bytes == SIZE_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
     ssdgs_real *statistics =
         (ssdgs_real *)ssdgs__allocate(context, (SSDGS__STATISTICS + 2) * capacity * sizeof(ssdgs_real));
     ssdgs_real *grown[3];
@@ -10733,9 +10556,7 @@ static ssdgs_result ssdgs__options_check(ssdgs_context *context, const ssdgs_tra
     if (o->version != SSDGS_VERSION)
         return ssdgs__fail(context, SSDGS_ERR_OPTIONS,
                            "train options: not made by ssdgs_train_options_default()");
-    const ssdgs_result result =
-        ssdgs__numbers_check(context, "train options", ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS, o);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__numbers_check(context, "train options", ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS, o));
     SSDGS__REFUSE(o->sum.add && (o->sum.processes < 1 || o->sum.rank < 0 || o->sum.rank >= o->sum.processes ||
                                  o->batch % o->sum.processes),
                   "train options: process %d of %d cannot share a batch of %d", o->sum.rank, o->sum.processes,
@@ -11190,10 +11011,9 @@ static ssdgs_result ssdgs__trainer_setup(ssdgs_trainer *trainer, const ssdgs_pho
 SSDGS_API ssdgs_result ssdgs_trainer_create(ssdgs_model *model, const ssdgs_photo *photos, int photo_count,
                                             const ssdgs_train_options *options, ssdgs_trainer **out) {
     if (out) *out = NULL;
-    if (!model) return SSDGS_ERR_ARGUMENT;
+    SSDGS__BEGIN(model, model->context, "ssdgs_trainer_create");
     ssdgs_context *context = model->context;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_trainer_create");
-    if (result) return result;
+    ssdgs_result result = SSDGS_OK;
     if (!out) return ssdgs__leave(context, ssdgs__null(context, "ssdgs_trainer_create", "out"));
     ssdgs_trainer *trainer = (ssdgs_trainer *)ssdgs__allocate(context, sizeof *trainer);
     if (!trainer) return ssdgs__leave(context, SSDGS_ERR_MEMORY);
@@ -11316,8 +11136,7 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
                                         o->normal_weight,
                                         o->refine & ~SSDGS_REFINE_AMBIENT,
                                         ssdgs__sees_ambient(trainer) ? trainer->sky_share : NULL};
-    const ssdgs_result result = ssdgs__photo_backward(frame, trainer->model, &photo_job, &values);
-    if (result) return result;
+    SSDGS__TRY(ssdgs__photo_backward(frame, trainer->model, &photo_job, &values));
     ssdgs__moves_of(trainer->photos + photo, correction, frame, correction_gradient);
     ssdgs__fade(trainer, step->t, (double)camera.width * camera.height,
                 frame->gradient + SSDGS_OPACITY * frame->gaussians.stride);
@@ -11532,10 +11351,8 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
 
 SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_stats *stats) {
     if (stats) memset(stats, 0, sizeof *stats);
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_step");
-    if (result) return result;
-    result = ssdgs__trainer_step(trainer, stats);
+    SSDGS__BEGIN(trainer, trainer->context, "ssdgs_trainer_step");
+    ssdgs_result result = ssdgs__trainer_step(trainer, stats);
     if (stats) {
         stats->iteration = trainer->run.iteration;
         stats->gaussians = trainer->model->count;
@@ -11546,9 +11363,8 @@ SSDGS_API ssdgs_result ssdgs_trainer_step(ssdgs_trainer *trainer, ssdgs_train_st
 
 SSDGS_API ssdgs_result ssdgs_trainer_run(ssdgs_trainer *trainer, ssdgs_progress progress, void *user) {
     int bad = 0;
-    if (!trainer) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(trainer->context, "ssdgs_trainer_run");
-    if (result) return result;
+    SSDGS__BEGIN(trainer, trainer->context, "ssdgs_trainer_run");
+    ssdgs_result result = SSDGS_OK;
     ssdgs__leave(trainer->context, SSDGS_OK);
     trainer->running++;
     while (trainer->run.iteration < trainer->options.iterations) {
@@ -12025,9 +11841,8 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
     unsigned char *bytes = NULL;
     size_t size = 0;
     if (iteration) *iteration = 0;
-    if (!context) return SSDGS_ERR_ARGUMENT;
-    ssdgs_result result = SSDGS__ENTER(context, "ssdgs_checkpoint_iteration");
-    if (result) return result;
+    SSDGS__BEGIN(context, context, "ssdgs_checkpoint_iteration");
+    ssdgs_result result = SSDGS_OK;
     if (!path || !iteration)
         result = ssdgs__null(context, "ssdgs_checkpoint_iteration", path ? "iteration" : "path");
     else result = ssdgs__read_file(context, path, sizeof(ssdgs__checkpoint_head) + 8, &bytes, &size);
@@ -13433,7 +13248,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                     t[v] = V_FNMA(alpha, t[v], t[v]);
                     last[v] = V_SEL(live, t[v], last[v]);
                     if (tile->median) {
-                        R *to = tile->median + micro * 16 + v * SSDGS__VW;
+                        R *to = tile->median + micro * 64 + v * SSDGS__VW;
                         const VM fell = V_AND(V_AND(live, V_GE(before, V_SET(0.5))), V_LT(t[v], V_SET(0.5)));
                         V_STORE(to, V_SEL(fell, V_SET(batch.distance[index]), V_LOAD(to)));
                     }

@@ -1385,7 +1385,7 @@ static void test_conic(int step) {
                 p.view[0] = p.view[5] = p.view[10] = 1;
                 p.fx = p.fy = FOCAL, p.cx = p.cy = SCREEN / 2, p.near_plane = (ssdgs_real)0.01;
                 p.log2_threshold = -8, p.width = p.height = SCREEN, p.variance = (ssdgs_real)0.1;
-                p.depth_scale = 1;
+                p.depth_scale = p.presence = 1;
                 int n = fill_turned(pow(10, size), pow(10, aspect), step);
                 ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record,
                                            depth);
@@ -1418,7 +1418,7 @@ static void test_conic(int step) {
         memset(&p, 0, sizeof p);
         p.view[0] = p.view[5] = p.view[10] = 1;
         p.fx = p.fy = FOCAL, p.log2_threshold = (ssdgs_real)-7.994353437, p.width = p.height = SCREEN;
-        p.variance = (ssdgs_real)0.1, p.depth_scale = 1, p.orthographic = 1;
+        p.variance = (ssdgs_real)0.1, p.depth_scale = p.presence = 1, p.orthographic = 1;
         if (!ssdgs__table(isa)) continue;
         fill_turned(1e10, 1, 90);
         for (int i = 0; i < 16; i++) /* hardly above the threshold: a box of no size */
@@ -1458,7 +1458,7 @@ static void test_masks(int step) {
                 p.view[0] = p.view[5] = p.view[10] = 1;
                 p.fx = p.fy = FOCAL, p.cx = (ssdgs_real)100.3, p.cy = (ssdgs_real)140.8;
                 p.near_plane = (ssdgs_real)0.01, p.log2_threshold = -8, p.width = p.height = WIDE;
-                p.variance = (ssdgs_real)0.1, p.depth_scale = 1;
+                p.variance = (ssdgs_real)0.1, p.depth_scale = p.presence = 1;
                 p.orthographic = 1;
                 const int n = fill_turned(pow(10, size), pow(10, aspect), step);
                 for (int i = 0; i < n && aspect > 1; i++) { /* their thin parts, far from the centre */

@@ -594,7 +594,7 @@ static void test_needles(void) {
         memset(&view, 0, sizeof view);
         view.view[0] = view.view[5] = view.view[10] = view.fx = view.fy = 1;
         view.orthographic = 1;
-        view.depth_scale = 1;
+        view.depth_scale = view.presence = 1;
         view.compensate = compensated;
         view.variance = (ssdgs_real)0.1;
         view.blur = SSDGS_BLUR_ADD;
@@ -656,7 +656,7 @@ static void test_opaque(void) {
     memset(&view, 0, sizeof view);
     view.view[0] = view.view[5] = view.view[10] = view.fx = view.fy = 1;
     view.orthographic = 1;
-    view.depth_scale = 1;
+    view.depth_scale = view.presence = 1;
     view.variance = (ssdgs_real)0.1;
     memset(gaussians, 0, VALUES * sizeof *gaussians);
     memset(gradient, 0, VALUES * sizeof *gradient);

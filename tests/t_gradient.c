@@ -686,7 +686,7 @@ static void test_fade(void) {
         memset(splat, 0, sizeof splat);
         k.width = 4000, k.height = 3000, k.fx = 900, k.fy = 1000, k.cx = 2100,
         k.cy = 1450; /* borders: 2.1, 1.5 */
-        k.log2_threshold = -60, k.variance = 0.1, k.depth_scale = 1;
+        k.log2_threshold = -60, k.variance = 0.1, k.depth_scale = k.presence = 1;
         k.view[0] = k.view[5] = k.view[10] = 1;
         for (int j = 0; j < 12; j++) k.view[j] += 0.1 * (draw(at++) - 0.5);
         const double z = 0.5 + draw(at), x = part == 0 ? 0 : 1.5 + 3 * draw(at + 1),

@@ -416,7 +416,7 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
     const int count = model->count;
     ssdgs__frame_memory *memory = NULL;
     CHECK(count <= MOST);
-    memcpy(found, model->sky_share, (size_t)count * sizeof *found);
+    memcpy(found, model->sky_share.memory, (size_t)count * sizeof *found);
     memset(many, 0, sizeof many);
     memset(sums, 0, sizeof sums);
     for (int i = 0; i < MANY; i++) {
@@ -440,12 +440,13 @@ static void test_ambient_cloud(ssdgs_model *model, int number) {
     CHECK(sqrt(error2) < 0.1 && high - low > 0.4);
     /* all that ambient light brings goes with them; they are found once */
     for (int half = 0; half < 2; half++) {
-        for (int i = 0; i < count; i++) model->sky_share[i] = found[i] * (half ? (ssdgs_real)0.5 : 1);
+        for (int i = 0; i < count; i++)
+            ((ssdgs_real *)model->sky_share.memory)[i] = found[i] * (half ? (ssdgs_real)0.5 : 1);
         alone(model, &camera, NULL, 0, &options, shot + half);
     }
     for (int i = 0; i < 3 * PIXELS; i++) shot[0].value[i] *= (ssdgs_real)0.5;
     CHECK_NEAR(shot[1].value, shot[0].value, 3 * PIXELS, exactly(1e-7), exactly(1e-5), "half of the sky");
-    memcpy(model->sky_share, found, (size_t)count * sizeof *found);
+    memcpy(model->sky_share.memory, found, (size_t)count * sizeof *found);
     /* once a model, until it changes */
     const uint64_t known = model->sky_share_revision;
     alone(model, &camera, NULL, 0, &options, shot + 1);
@@ -486,7 +487,8 @@ static void test_sky_shares_of_a_sheet(void) {
             CHECK(!ssdgs_model_set(model, i, &g));
         }
         alone(model, &camera, NULL, 0, &options, shot);
-        CHECK(model->sky_share[SHEET] > (ssdgs_real)0.85 && model->sky_share[SHEET + 1] < (ssdgs_real)0.25);
+        CHECK(((ssdgs_real *)model->sky_share.memory)[SHEET] > (ssdgs_real)0.85 &&
+              ((ssdgs_real *)model->sky_share.memory)[SHEET + 1] < (ssdgs_real)0.25);
         ssdgs_model_destroy(model);
     }
 }
