@@ -141,7 +141,8 @@ SCENES, as engines have them: examples/engine.c is one
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with
-  the number of Gaussians: examples/reduce.h makes levels of detail.
+  the number of Gaussians: examples/reduce.h makes levels of detail, build/train --refit teaches them what the
+  model shows, and of ssdgs_object.levels a frame draws what pixels ask for.
   Skipped without changing any bit: Gaussians that no pixel blends, neurons that are 0 in a whole block of 64
   Gaussians, terms not asked for, results of the last frame that still hold.
 
@@ -172,6 +173,8 @@ CHANGES, for programs written for 0.2.4
   notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
   a hook's view is `cached` 1    2; 1 says that WALK is to be done again
+  ssdgs_scene_light(.., lights)  the camera before the lights, or NULL
+  options.max_gaussians          what training ends with; before it may have options.surplus times as many
   raw planes of a baked model    14, and f_rest behind: ssdgs_model_view.channels; SSDGS_DIFFUSE is f_dc
 
 CONTENTS, search for the tag
@@ -545,9 +548,10 @@ typedef struct ssdgs_render_options {
    what of an even sky its own model leaves it, which is found anew after each change of the model. Shadows do
    not change it; image.scattering has it. */
 
-/* For games (max_error 1/16, stop 1/1024, transport_detail 0.6), the method as written, for speed (max_error
-   1/4, stop 1/256, light_detail 0.7, transport_detail 0.6) and for previews (max_error 1/2, stop 1/64,
-   light_detail 0.6, transport_detail 0.4, alpha_threshold 2/255). SPEED in the manual says what they lose. */
+/* For games (max_error 1/16, stop 1/1024, transport_detail 0.6, level_detail 1), the method as written, for
+   speed (max_error 1/4, stop 1/256, light_detail 0.7, transport_detail 0.6, level_detail 0.5) and for
+   previews (max_error 1/2, stop 1/64, light_detail 0.6, transport_detail 0.4, level_detail 0.3,
+   alpha_threshold 2/255). SPEED in the manual says what they lose. */
 SSDGS_API ssdgs_render_options ssdgs_render_options_default(void);
 SSDGS_API ssdgs_render_options ssdgs_render_options_exact(void);
 SSDGS_API ssdgs_render_options ssdgs_render_options_fast(void);
@@ -597,11 +601,11 @@ typedef struct ssdgs_object {
                                    stays as it is. Geometric lobes take roughness whole. Read in the call.
                                    NULL: all do; NULL */
     ssdgs_real presence;        /* 0 .. 1: share of its optical depth that is there: fades it in and out; 1 */
-    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, from one to the next
-                                   a fifth less or more. A frame draws the least one that still has 3 for 8
-                                   pixels of the object's box x options.level_detail, or up to a quarter above
-                                   that two which fade into each other. An object with a mask stays as it is.
-                                   Read in the call; NULL */
+    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, each of four fifths
+                                   of those before or less. A frame draws the least one that has 3 for 8
+                                   pixels of the object's box, times options.level_detail; where it has up to
+                                   a tenth more, two that fade into each other. An object with a mask stays as
+                                   it is. Read in the call; NULL */
     int level_count;
 } ssdgs_object;
 /* A model as it was trained, where its settings.placement puts it. */
@@ -635,10 +639,11 @@ typedef struct ssdgs_occluder {
    else. Copied. */
 SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occluder);
 /* Makes the lights' maps of a frame ahead of it, for ssdgs_scene_shadow(). ssdgs_scene_render() with the same
-   objects, lights and options finds them made. From then on every frame of the scene makes them. */
+   objects, lights and options finds them made. From then on every frame of the scene makes them. camera: the
+   frame's, for objects with levels; NULL: of the models themselves. */
 SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
-                                         const ssdgs_light *lights, int light_count,
-                                         const ssdgs_render_options *options);
+                                         const ssdgs_camera *camera, const ssdgs_light *lights,
+                                         int light_count, const ssdgs_render_options *options);
 /* What of a light passes the scene's objects on the way to points (count,3), world: fraction (count), 0 .. 1.
    By the maps of the scene's last frame, of ssdgs_scene_light() or ssdgs_scene_render(), which note the first
    2 % lost. 1 for a light without shadow. ERR_ARGUMENT: that frame had no such light, made no maps or
@@ -1186,9 +1191,15 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #endif
 #ifdef SSDGS_NO_TRAINER
 #define SSDGS__TRAINING SSDGS__UNUSED /* what only training calls is left out by the compiler */
+#define SSDGS__TRAINS(kernel) NULL
 #else
 #define SSDGS__TRAINING
+#define SSDGS__TRAINS(kernel) kernel
 #endif
+/* Of the kernels, by their instruction set */
+#define SSDGS__FN static SSDGS__TRAINING SSDGS__TARGET
+#define SSDGS__FI static SSDGS__INLINE SSDGS__TARGET
+#define SSDGS__NV (16 / SSDGS__VW) /* vectors in a 4x4 micro-tile */
 
 /* Code that takes no time of a frame or a training step is compiled to be small: SSDGS__SMALL_BEGIN ..
    _END. */
@@ -3971,7 +3982,7 @@ static const ssdgs__number ssdgs__render_numbers[] = {
     SSDGS__O(max_error, 'r', 0, 1, 0, 1.0 / 16, 1.0 / 4, 1.0 / 2),
     SSDGS__O(light_detail, 'r', 0.01, 8, 1, 1, 0.7, 0.6),
     SSDGS__O(transport_detail, 'r', 0.1, 8, 1, 0.6, 0.6, 0.4),
-    SSDGS__O(level_detail, 'r', 0, 8, 0, 1, 0.7, 0.5)};
+    SSDGS__O(level_detail, 'r', 0, 8, 0, 1, 0.5, 0.3)};
 /* clang-format on */
 #undef SSDGS__O
 enum { SSDGS__RENDER_NUMBERS = sizeof ssdgs__render_numbers / sizeof *ssdgs__render_numbers };
@@ -7628,14 +7639,15 @@ static double ssdgs__needed(const ssdgs_object *o, const ssdgs_camera *camera, d
 }
 
 /* Objects with the levels that their sizes in the picture ask for. Only they decide: nothing pops. */
-static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, ssdgs__request *request) {
+static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, const ssdgs_camera *camera,
+                                         ssdgs__request *request) {
     ssdgs_context *context = scene->context;
     ssdgs_object *chosen;
     const double detail = (double)(request->options ? request->options->level_detail
                                                     : ssdgs_render_options_default().level_detail);
     int levels = 0, count = 0;
     for (int i = 0; i < request->object_count; i++) levels += request->objects[i].level_count > 0;
-    if (!levels || !(detail > 0)) return SSDGS_OK;
+    if (!levels || !camera || !(detail > 0)) return SSDGS_OK;
     SSDGS__RESERVE(scene->chosen, chosen, ssdgs_object, request->object_count + levels);
     for (int i = 0; i < request->object_count; i++) {
         ssdgs_object *o = chosen + count++;
@@ -7643,10 +7655,10 @@ static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, ssdgs__request *req
         if (!o->level_count || o->mask) continue;
         const ssdgs_result result = ssdgs__model_box(o->model);
         if (result) return result;
-        const double needed = ssdgs__needed(o, request->camera, detail);
+        const double needed = ssdgs__needed(o, camera, detail);
         for (int j = 0; j < o->level_count; j++) {
             const double share =
-                4 * (o->levels[j]->count / needed - 1); /* of the level, not of what is before */
+                10 * (o->levels[j]->count / needed - 1); /* of the level, not of what is before */
             if (!(share > 0)) break;
             if (share < 1) {
                 chosen[count] = *o;
@@ -7679,7 +7691,7 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
     request.maps = scene->maps;
     request.mirrored = 1;
     request.occluder = &scene->occluder;
-    if (!result) result = ssdgs__choose_levels(scene, &request);
+    if (!result) result = ssdgs__choose_levels(scene, camera, &request);
     if (!result) result = ssdgs__frame_begin(&frame, context, &scene->frame, &request);
     if (!result) result = ssdgs__render(&frame, image, stats);
     return ssdgs__scene_leave(scene, result);
@@ -7694,8 +7706,8 @@ SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occ
 
 /* Projects, sorts, bins and walks what the lights see; the camera's view stays as it is. */
 SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
-                                         const ssdgs_light *lights, int light_count,
-                                         const ssdgs_render_options *options) {
+                                         const ssdgs_camera *camera, const ssdgs_light *lights,
+                                         int light_count, const ssdgs_render_options *options) {
     ssdgs_frame frame;
     SSDGS__BEGIN(scene, scene->context, "ssdgs_scene_light");
     ssdgs_result result = SSDGS_OK;
@@ -7704,6 +7716,7 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
     request.mirrored = 1;
     request.occluder = &scene->occluder;
     result = ssdgs__objects_check(scene->context, objects, object_count);
+    if (!result) result = ssdgs__choose_levels(scene, camera, &request);
     if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, &request);
     if (!result) result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
     return ssdgs__scene_leave(scene, result);
@@ -8086,16 +8099,11 @@ static void ssdgs__loss_pad_task(void *data, int index) {
 }
 
 static ssdgs__ssim_row ssdgs__loss_row(const ssdgs__loss_job *job, int task, int y) {
-    const size_t at = ssdgs__padded_at(job, task / job->bands, y);
-    ssdgs__ssim_row row;
-    row.image = job->padded[0] + at;
-    row.reference = job->padded[1] + at;
-    row.d_mean = job->padded[2] + at;
-    row.d_square = job->padded[3] + at;
-    row.d_product = job->padded[4] + at;
-    row.scratch = job->scratch + (size_t)task * 5 * job->stride;
-    row.stride = job->stride;
-    row.width = job->width;
+    const size_t at = ssdgs__padded_at(job, task / job->bands, y), scratch = (size_t)task * 5 * job->stride;
+    ssdgs_real *const *p = job->padded;
+    const ssdgs__ssim_row row = {p[0] + at,   p[1] + at, p[2] + at,
+                                 p[3] + at,   p[4] + at, job->scratch + scratch,
+                                 job->stride, job->width};
     return row;
 }
 
@@ -8982,16 +8990,12 @@ static void ssdgs__ply_find_origin(ssdgs__ply *ply, ssdgs_settings *settings) {
                                       (ssdgs_real)(float)(low[i] <= high[i] ? 0.5 * (low[i] + high[i]) : 0));
 }
 
-static int ssdgs__has_origin(const ssdgs_settings *s) {
-    int i;
-    for (i = 0; i < 3 && !(s->origin[i] < 0) && !(s->origin[i] > 0); i++) {}
-    return i < 3;
-}
-
 /* Notes what a model will not do that its user may expect. */
 static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, const ssdgs_load_stats *stats) {
     ssdgs_context *context = model->context;
     const char *name = ply->name;
+    int moved = 0;
+    for (int i = 0; i < 3; i++) moved |= ply->origin[i] < 0 || ply->origin[i] > 0;
     if (ply->behind)
         ssdgs__note(context, "%s: %z bytes behind the last element are not read: was it copied as text?",
                     name, ply->behind);
@@ -9002,7 +9006,7 @@ static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, con
     else if (model->settings.baked)
         ssdgs__note(context, "%s: plain splats, which have their colours baked in: lights change nothing",
                     name);
-    if (!ply->known[SSDGS__PLY_SETTINGS] && ssdgs__has_origin(&model->settings))
+    if (!ply->known[SSDGS__PLY_SETTINGS] && moved)
         ssdgs__note(context, "%s: positions are relative to settings.origin, %g, %g, %g", name,
                     (double)model->settings.origin[0], (double)model->settings.origin[1],
                     (double)model->settings.origin[2]);
@@ -9169,13 +9173,9 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, s
     if (!result && ferror(file))
         result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be read (errno %d)", path, errno);
     fclose(file);
-    if (result) {
-        ssdgs__release(context, buffer);
-        return result;
-    }
-    *bytes = buffer;
-    *size = used;
-    return SSDGS_OK;
+    if (result) ssdgs__release(context, buffer);
+    else *bytes = buffer, *size = used;
+    return result;
 }
 
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
@@ -9272,7 +9272,7 @@ static void ssdgs__writer_flush(ssdgs__writer *writer) {
     writer->used = 0;
 }
 
-static ssdgs_result ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, size_t size) {
+static void ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, size_t size) {
     const unsigned char *from = (const unsigned char *)bytes;
     while (!writer->result && size) {
         const size_t room = SSDGS__WRITER_BUFFER - writer->used, part = size < room ? size : room;
@@ -9282,7 +9282,6 @@ static ssdgs_result ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, 
         size -= part;
         if (writer->used == SSDGS__WRITER_BUFFER) ssdgs__writer_flush(writer);
     }
-    return writer->result;
 }
 
 static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
@@ -9314,12 +9313,6 @@ static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
 
 static void ssdgs__writer_text(ssdgs__writer *writer, const char *text) {
     ssdgs__writer_put(writer, text, strlen(text));
-}
-
-static void ssdgs__writer_word(ssdgs__writer *writer, uint32_t word) {
-    unsigned char bytes[4];
-    for (int i = 0; i < 4; i++) bytes[i] = (unsigned char)(word >> 8 * i);
-    ssdgs__writer_put(writer, bytes, 4);
 }
 
 static double ssdgs__ply_softplus(ssdgs_real raw) { return raw > 20 ? (double)raw : log1p(exp((double)raw)); }
@@ -9378,7 +9371,9 @@ static void ssdgs__ply_write_row(const ssdgs_model *model, int kind, size_t row,
                    cursor.word >= (settings->kept > 0 ? SSDGS__PLY_DC : SSDGS__PLY_REST)) {
             *word = ssdgs__ply_bits((double)*ssdgs__ply_cell(model, row, &cursor));
         }
-        ssdgs__writer_word(writer, *word);
+        const unsigned char bytes[4] = {(unsigned char)*word, (unsigned char)(*word >> 8),
+                                        (unsigned char)(*word >> 16), (unsigned char)(*word >> 24)};
+        ssdgs__writer_put(writer, bytes, 4);
     }
 }
 
@@ -9643,21 +9638,6 @@ static ssdgs_real ssdgs__photo_number(const ssdgs_photo *photo, size_t at) {
     }
 }
 
-/* A stored value; 3: alpha. */
-static ssdgs_real ssdgs__photo_value(const ssdgs_photo *photo, int transfer, size_t pixel, int c) {
-    const ssdgs_real number = ssdgs__photo_number(photo, 4 * pixel + (size_t)c);
-    return c < 3 && transfer == SSDGS_TRANSFER_SRGB && ssdgs__is_light(photo) ? ssdgs_srgb_encode(number)
-                                                                              : number;
-}
-
-/* A pixel's stored values on the background. */
-static void ssdgs__photo_pixel(const ssdgs_photo *photo, int transfer, const ssdgs_real background[3],
-                               size_t pixel, ssdgs_real value[3]) {
-    const ssdgs_real alpha = ssdgs__photo_value(photo, transfer, pixel, 3);
-    for (int c = 0; c < 3; c++)
-        value[c] = alpha * ssdgs__photo_value(photo, transfer, pixel, c) + (1 - alpha) * background[c];
-}
-
 /* Stored values of pixels begin .. end, as planes. */
 static void ssdgs__photo_planes(const ssdgs__kernels *k, const ssdgs_photo *photo, int transfer,
                                 const ssdgs_real background[3], size_t begin, size_t end,
@@ -9736,25 +9716,15 @@ static void ssdgs__correct(const ssdgs_photo *photo, const double value[10], ssd
 /* dL/d(view) of the corrected camera -> dL/d(t', w). */
 static void ssdgs__correct_backward(const ssdgs_photo *photo, const double value[10],
                                     const ssdgs_real dview[12], double d[6]) {
-    double e[9], jacobian[9];
+    double e[9], jacobian[9], m[9] = {0, 0, 0, 0, 0, 0, 0, 0, 0};
     ssdgs__rotate_by(value + 3, e, jacobian);
-    double de[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            de[3 * i + j] = 0;
-            for (int l = 0; l < 4; l++)
-                de[3 * i + j] += (double)dview[4 * i + l] * (double)photo->camera.view[4 * j + l];
-        }
-    double m[9];
-    for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++) {
-            m[3 * i + j] = 0;
-            for (int l = 0; l < 3; l++) m[3 * i + j] += de[3 * i + l] * e[3 * j + l];
-        }
-    double delta[3];
-    delta[0] = m[7] - m[5]; /* exp(w + dw) = exp(J dw) exp(w) */
-    delta[1] = m[2] - m[6];
-    delta[2] = m[3] - m[1];
+    for (int i = 0; i < 3; i++) {
+        double de[3] = {0, 0, 0};
+        for (int j = 0; j < 12; j++)
+            de[j / 4] += (double)dview[4 * i + j % 4] * (double)photo->camera.view[j];
+        for (int j = 0; j < 9; j++) m[3 * i + j / 3] += de[j % 3] * e[j];
+    }
+    const double delta[3] = {m[7] - m[5], m[2] - m[6], m[3] - m[1]}; /* exp(w + dw) = exp(J dw) exp(w) */
     for (int i = 0; i < 3; i++) {
         d[i] = (double)dview[4 * i + 3];
         d[3 + i] = 0;
@@ -9871,13 +9841,11 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     const int bands = (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND;
     frame->normal_gradient = NULL;
     if (!frame->layer_count || weight <= 0) return SSDGS_OK;
-    ssdgs__normals_job job;
-    job.frame = frame;
-    job.weight = weight / (ssdgs_real)pixels;
-    job.stride = ssdgs__padded_stride(frame->camera.width);
+    const size_t stride = ssdgs__padded_stride(frame->camera.width);
     SSDGS__RESERVE(frame->scratch->normals, frame->normal_gradient, ssdgs_real,
-                   4 * pixels + (size_t)bands * (SSDGS__BAND + 6) * job.stride);
-    job.scratch = frame->normal_gradient + 4 * pixels;
+                   4 * pixels + (size_t)bands * (SSDGS__BAND + 6) * stride);
+    ssdgs__normals_job job = {frame, weight / (ssdgs_real)pixels, frame->normal_gradient + 4 * pixels,
+                              stride};
     ssdgs__parallel(context, bands, ssdgs__normals_task, &job);
     return SSDGS_OK;
 }
@@ -9929,14 +9897,12 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     }
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
-    ssdgs__store_job job;
-    SSDGS__RESERVE(frame->scratch->image, job.image, ssdgs_real, pixels * 9);
-    SSDGS__RESERVE(frame->scratch->target, job.target, ssdgs_real, pixels * 3);
-    job.frame = frame;
-    job.photo = photo_job->photo;
-    job.background = photo_job->background;
-    job.slope = job.image + pixels * 3;
-    job.by_transmittance = job.image + pixels * 6;
+    ssdgs_real *image, *target;
+    SSDGS__RESERVE(frame->scratch->image, image, ssdgs_real, pixels * 9);
+    SSDGS__RESERVE(frame->scratch->target, target, ssdgs_real, pixels * 3);
+    ssdgs__store_job job = {frame, photo_job->photo,   photo_job->background,
+                            image, image + pixels * 3, image + pixels * 6,
+                            target};
     ssdgs__parallel(context, tasks, ssdgs__store_task, &job);
     double along = 0,
            across = 0; /* as if all light were the lamp's, d(image)/d(ln intensity) is slope x pixels */
@@ -10008,15 +9974,15 @@ static ssdgs_real ssdgs__bias_correction(double beta,
     return (ssdgs_real)(1 / (1 - power));
 }
 
-/* Adds a group's range, of which the arrays and their length are given. */
-static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int group, double t, double epsilon,
-                            const ssdgs__adam_range *arrays) {
+/* Adds a group's range of n numbers, whose arrays are the caller's to set. */
+static ssdgs__adam_range *ssdgs__adam_add(ssdgs__adam_job *job, const ssdgs_trainer *trainer, int group,
+                                          double t, double epsilon, size_t n) {
     ssdgs__adam_range *r = job->range + job->ranges++;
     const ssdgs_train_options *o = &trainer->options;
     const double rate = ssdgs__group_rate(trainer, group, t) * sqrt((double)o->batch) *
                         (t < 0.9 * ssdgs__schedule_end(o) ? 1 : (double)o->finish);
-    *r = *arrays;
     r->group = group;
+    r->n = n;
     r->bad = 0;
     r->rate.rate = (ssdgs_real)(rate < 1e18 ? rate : 1e18); /* times a gradient, at most 1e18, it is finite */
     r->rate.correct_mean = ssdgs__bias_correction(0.9, trainer->run.steps[group] + 1);
@@ -10024,7 +9990,8 @@ static void ssdgs__adam_add(ssdgs__adam_job *job, ssdgs_trainer *trainer, int gr
     if (group == SSDGS__G_POSITION) epsilon /= trainer->unit; /* of a move by the bounds' longest side */
     r->rate.epsilon = (ssdgs_real)(epsilon < 1e-15 ? 1e-15 : epsilon < 1e30 ? epsilon : 1e30);
     r->first_chunk = job->chunks;
-    job->chunks += (r->n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
+    job->chunks += (n + SSDGS__ADAM_CHUNK - 1) / SSDGS__ADAM_CHUNK;
+    return r;
 }
 
 /* Which terms a group serves: it rests while none of them is in use. Where light is deferred an ASG weight is
@@ -10058,33 +10025,21 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     ssdgs__adam_job job;
-    ssdgs__adam_range arrays;
-    memset(&arrays, 0, sizeof arrays);
     job.k = context->k;
     job.ranges = 0;
     job.chunks = 0;
     for (int group = 0; group < SSDGS__GROUPS; group++) {
-        const int shared = group - SSDGS__PLANE_GROUPS;
+        const int shared = group - SSDGS__PLANE_GROUPS, own = shared < 0;
         if (!step->learns[group] || !ssdgs__group_used(group, step->terms, model->settings.asg)) continue;
-        if (shared >= 0) {
-            const size_t at = first[shared], n = first[shared + 1] - at;
-            if (!n) continue;
-            arrays.parameter = model->globals + at;
-            arrays.gradient = frame->global_gradient + at;
-            arrays.mean = trainer->global_mean + at;
-            arrays.square = trainer->global_square + at;
-            arrays.n = n;
-            ssdgs__adam_add(&job, trainer, group, step->t, epsilon, &arrays);
-        } else {
-            for (int c = ssdgs__group_plane[group]; c < ssdgs__group_plane[group + 1]; c++) {
-                const size_t at = (size_t)c * trainer->stride;
-                arrays.parameter = model->gaussians + at;
-                arrays.gradient = frame->gradient + at;
-                arrays.mean = trainer->mean + at;
-                arrays.square = trainer->square + at;
-                arrays.n = (size_t)model->count;
-                ssdgs__adam_add(&job, trainer, group, step->t, epsilon, &arrays);
-            }
+        size_t at = own ? (size_t)ssdgs__group_plane[group] * trainer->stride : first[shared];
+        const size_t n = own ? (size_t)model->count : first[shared + 1] - at;
+        int planes = own ? ssdgs__group_plane[group + 1] - ssdgs__group_plane[group] : n > 0;
+        for (; planes; planes--, at += trainer->stride) {
+            ssdgs__adam_range *r = ssdgs__adam_add(&job, trainer, group, step->t, epsilon, n);
+            r->parameter = (own ? model->gaussians : model->globals) + at;
+            r->gradient = (own ? frame->gradient : frame->global_gradient) + at;
+            r->mean = (own ? trainer->mean : trainer->global_mean) + at;
+            r->square = (own ? trainer->square : trainer->global_square) + at;
         }
     }
     ssdgs__parallel(context, job.ranges, ssdgs__finite_task, &job);
@@ -10101,11 +10056,6 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     return SSDGS_OK;
 }
 
-/* Radians across the picture's width, its centre on the axis. */
-static double ssdgs__view_angle(const ssdgs_camera *camera) {
-    return 2 * atan(0.5 * camera->width / (double)camera->fx);
-}
-
 /* Adam's step of a number at rate 1, whose moments it moves. */
 static double ssdgs__adam_one(double gradient, double *mean, double *square, int steps) {
     *mean = 0.9 * *mean + 0.1 * gradient;
@@ -10114,16 +10064,13 @@ static double ssdgs__adam_one(double gradient, double *mean, double *square, int
            (sqrt(*square * (double)ssdgs__bias_correction(0.999, steps)) + 1e-15);
 }
 
-/* A light's rate is a share of this: a length, or a radian. */
-static double ssdgs__light_unit(const ssdgs_light *light, double unit) {
-    return light->kind == SSDGS_LIGHT_DIRECTIONAL ? 1 : unit;
-}
-
-/* Adam on a photograph's camera (part 0) or light (part 1); a turn by `angle` moves what is seen by the
-   picture's width. */
-static void ssdgs__correction_step(ssdgs__correction *c, const double *gradient, int part, double rate,
-                                   double unit, double angle) {
+/* Adam on a photograph's camera (part 0) or light (part 1). A move's rate is a share of `unit`, a direction's
+   of a radian, a turn's of the angle across the picture's width. */
+static void ssdgs__correction_step(ssdgs__correction *c, const ssdgs_photo *photo, const double *gradient,
+                                   int part, double rate, double unit) {
+    const double angle = 2 * atan(0.5 * photo->camera.width / (double)photo->camera.fx);
     const int steps = ++c->steps[part];
+    if (part && photo->light.kind == SSDGS_LIGHT_DIRECTIONAL) unit = 1;
     for (int i = part ? 6 : 0; i < (part ? 9 : 6); i++) {
         const double step = ssdgs__adam_one(gradient[i], c->mean + i, c->square + i, steps);
         c->value[i] -= rate * (i / 3 == 1 ? angle : unit) * step;
@@ -10280,11 +10227,6 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     return SSDGS_OK;
 }
 
-static void ssdgs__copy_gaussian(ssdgs_real *planes, size_t stride, size_t to, size_t from) {
-    for (int c = 0; c < SSDGS_CHANNELS; c++)
-        planes[(size_t)c * stride + to] = planes[(size_t)c * stride + from];
-}
-
 /* Sum of twelve uniforms less six: normal enough to scatter split Gaussians, the same on every machine. */
 static double ssdgs__normal(uint64_t key, uint64_t counter) {
     double sum = -6;
@@ -10336,7 +10278,7 @@ static void ssdgs__make_two(ssdgs_trainer *trainer, size_t from, size_t to) {
     const uint64_t key = o->seed ^ ((uint64_t)trainer->run.iteration << 32) ^ from;
     const size_t stride = trainer->stride;
     ssdgs_real *p = trainer->model->gaussians;
-    ssdgs__copy_gaussian(p, stride, to, from);
+    for (size_t c = 0; c < SSDGS_CHANNELS; c++) p[c * stride + to] = p[c * stride + from];
     ssdgs__forget(trainer, to);
     if ((double)ssdgs__longest(trainer, from) <= log(SSDGS__SPLIT_SIZE * trainer->extent))
         return; /* the copy is the clone */
@@ -10424,10 +10366,7 @@ static ssdgs_result ssdgs__outlines(const ssdgs_trainer *trainer, unsigned char 
         ssdgs_light light;
         ssdgs__correct(trainer->photos + i, trainer->corrections[i].value, cameras + i, &light);
     }
-    ssdgs__outlines_job job;
-    job.trainer = trainer;
-    job.cameras = cameras;
-    job.outside = outside;
+    ssdgs__outlines_job job = {trainer, cameras, outside};
     ssdgs__parallel(context, ssdgs__chunks(trainer->model->count), ssdgs__outlines_task, &job);
     ssdgs__release(context, cameras);
     return SSDGS_OK;
@@ -10865,19 +10804,24 @@ static void ssdgs__judge_background(ssdgs_trainer *trainer) {
     for (int i = 0; i < trainer->photo_count; i++) {
         const ssdgs_photo *photo = trainer->photos + i;
         const int w = photo->camera.width, h = photo->camera.height;
+        const int encodes =
+            ssdgs__is_light(photo) && trainer->model->settings.transfer == SSDGS_TRANSFER_SRGB;
         if (trainer->transparent[i] == 2) continue;
         for (int y = 0; y < h; y++)
             for (int x = 0; x < w; x += y == 0 || y == h - 1 || w == 1 ? 1 : w - 1) {
                 const size_t pixel = (size_t)y * (size_t)w + (size_t)x;
-                ssdgs_real value[3], apart = 0;
+                const ssdgs_real alpha = ssdgs__photo_number(photo, 4 * pixel + 3);
+                ssdgs_real apart = 0;
                 if (!ssdgs__photo_alpha(photo, pixel)) continue; /* shows nothing */
-                ssdgs__photo_pixel(photo, trainer->model->settings.transfer, background, pixel, value);
-                for (int c = 0; c < 3; c++) {
-                    const ssdgs_real d =
-                        value[c] > background[c] ? value[c] - background[c] : background[c] - value[c];
+                for (size_t c = 0; c < 3; c++) {                 /* stored values on the background */
+                    const ssdgs_real number = ssdgs__photo_number(photo, 4 * pixel + c),
+                                     value = alpha * (encodes ? ssdgs_srgb_encode(number) : number) +
+                                             (1 - alpha) * background[c],
+                                     d = value > background[c] ? value - background[c]
+                                                               : background[c] - value;
                     apart = d > apart ? d : apart;
-                    mean[c] += (double)value[c];
-                    square[c] += (double)value[c] * (double)value[c];
+                    mean[c] += (double)value;
+                    square[c] += (double)value * (double)value;
                 }
                 same += apart < (ssdgs_real)(8.5 / 255);
                 count++;
@@ -11247,19 +11191,18 @@ static void ssdgs__refine_step(ssdgs_trainer *trainer, double t, int photo,
     const ssdgs_train_options *o = &trainer->options;
     const double shows = (double)o->iterations / trainer->photo_count,
                  wider = shows < 300 ? sqrt(300 / shows) : 1;
-    const double angle = ssdgs__view_angle(&trainer->photos[photo].camera);
     ssdgs__correction *correction = trainer->corrections + photo;
     if (refines[0])
-        ssdgs__correction_step(correction, correction_gradient, 0,
+        ssdgs__correction_step(correction, trainer->photos + photo, correction_gradient, 0,
                                wider * ssdgs__decay(o->rates.camera, 0, 60e3, t) * (t < 20e3 ? t / 20e3 : 1),
-                               trainer->unit, angle);
+                               trainer->unit);
     if (refines[0] && o->rates.position.start > 0)
         ssdgs__anchor_cameras(trainer); /* else the scene stays, and says where they are */
     if (trainer->photos[photo].more_count) return;
     if (refines[1])
-        ssdgs__correction_step(correction, correction_gradient, 1,
+        ssdgs__correction_step(correction, trainer->photos + photo, correction_gradient, 1,
                                wider * ssdgs__decay(o->rates.light, 0, 60e3, t) * (t < 30e3 ? t / 30e3 : 1),
-                               ssdgs__light_unit(&trainer->photos[photo].light, trainer->unit), angle);
+                               trainer->unit);
     if (refines[2]) ssdgs__intensity_step(correction, correction_gradient);
     if (refines[2] && o->rates.color.start > 0) /* colours that stay as they are tell the intensities */
         ssdgs__anchor_intensities(trainer);
@@ -11483,7 +11426,6 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
     ssdgs__correction correction;
     memset(&correction, 0, sizeof correction);
     const double unit = ssdgs__model_unit(model);
-    const double angle = ssdgs__view_angle(&photo->camera);
     ssdgs_camera camera;
     ssdgs_light light;
     for (int i = 0; i < iterations; i++) {
@@ -11501,9 +11443,9 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
             if (!ssdgs__finite((ssdgs_real)gradient[j]))
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
-        ssdgs__correction_step(&correction, gradient, 0, rate, unit, angle);
+        ssdgs__correction_step(&correction, photo, gradient, 0, rate, unit);
         if (photo->more_count || model->settings.baked) continue;
-        ssdgs__correction_step(&correction, gradient, 1, rate, ssdgs__light_unit(&light, unit), angle);
+        ssdgs__correction_step(&correction, photo, gradient, 1, rate, unit);
         ssdgs__intensity_step(&correction, gradient);
     }
     ssdgs__correct(photo, correction.value, &camera, &light);
@@ -11556,27 +11498,38 @@ typedef struct ssdgs__checkpoint_head { /* then the photographs, the arrays and 
     ssdgs_train_options options; /* without sum */
 } ssdgs__checkpoint_head;
 
-/* Passes every array of the state to visit, in order; the first failure ends it. */
-typedef ssdgs_result (*ssdgs__visit)(void *user, void *data, size_t size);
+/* A checkpoint that is written or, without a writer, read. */
+typedef struct ssdgs__checkpoint_io {
+    ssdgs__writer *writer;
+    const unsigned char *bytes;
+    uint64_t hash;
+} ssdgs__checkpoint_io;
 
-static ssdgs_result ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs__visit visit, void *user) {
+static void ssdgs__checkpoint_part(ssdgs__checkpoint_io *io, void *data, size_t size) {
+    if (io->writer) {
+        io->hash = ssdgs__fold(io->hash, data, size);
+        ssdgs__writer_put(io->writer, data, size);
+    } else {
+        memcpy(data, io->bytes, size);
+        io->bytes += size;
+    }
+}
+
+/* Every array of the state, in order. */
+static void ssdgs__checkpoint_arrays(const ssdgs_trainer *trainer, ssdgs__checkpoint_io *io) {
     ssdgs_model *model = trainer->model;
-    const size_t n = (size_t)model->count * sizeof(ssdgs_real),
-                 globals = model->global_count * sizeof(ssdgs_real);
+    const size_t n = (size_t)model->count * sizeof(ssdgs_real);
     ssdgs_real *const planes[3] = {model->gaussians, trainer->mean, trainer->square};
     ssdgs_real *const shared[3] = {model->globals, trainer->global_mean, trainer->global_square};
-    ssdgs_result result = SSDGS_OK;
-    for (int i = 0; i < 3 && !result; i++) {
-        for (int c = 0; c < SSDGS_CHANNELS && !result; c++)
-            result = visit(user, planes[i] + (size_t)c * trainer->stride, n);
-        if (!result) result = visit(user, shared[i], globals);
+    for (int i = 0; i < 3; i++) {
+        for (int c = 0; c < SSDGS_CHANNELS; c++)
+            ssdgs__checkpoint_part(io, planes[i] + (size_t)c * trainer->stride, n);
+        ssdgs__checkpoint_part(io, shared[i], model->global_count * sizeof(ssdgs_real));
     }
-    for (size_t i = 0; i < SSDGS__STATISTICS + 1 && !result; i++) /* and sky_share behind them */
-        result = visit(user, trainer->screen_gradient + i * trainer->stride, n);
-    if (!result)
-        result =
-            visit(user, trainer->corrections, (size_t)trainer->photo_count * sizeof *trainer->corrections);
-    return result;
+    for (size_t i = 0; i < SSDGS__STATISTICS + 1; i++) /* and sky_share behind them */
+        ssdgs__checkpoint_part(io, trainer->screen_gradient + i * trainer->stride, n);
+    ssdgs__checkpoint_part(io, trainer->corrections,
+                           (size_t)trainer->photo_count * sizeof *trainer->corrections);
 }
 
 static void ssdgs__checkpoint_describe(const ssdgs_trainer *trainer, ssdgs__checkpoint_head *head) {
@@ -11622,10 +11575,9 @@ static void ssdgs__checkpoint_photo_task(void *data, int index) {
 
 /* Of all photographs, to be released; NULL: out of memory. */
 static ssdgs__checkpoint_photo *ssdgs__checkpoint_photos(const ssdgs_trainer *trainer) {
-    ssdgs__checkpoint_job job;
-    job.photos = trainer->photos;
-    job.hashes = (ssdgs__checkpoint_photo *)ssdgs__allocate(trainer->context, (size_t)trainer->photo_count *
-                                                                                  sizeof *job.hashes);
+    ssdgs__checkpoint_job job = {trainer->photos, (ssdgs__checkpoint_photo *)ssdgs__allocate(
+                                                      trainer->context, (size_t)trainer->photo_count *
+                                                                            sizeof(ssdgs__checkpoint_photo))};
     if (job.hashes)
         ssdgs__parallel(trainer->context, trainer->photo_count, ssdgs__checkpoint_photo_task, &job);
     return job.hashes;
@@ -11654,25 +11606,6 @@ static const char *ssdgs__checkpoint_head_of(const unsigned char *bytes, size_t 
     return sound ? NULL : "its counts are out of range";
 }
 
-typedef struct ssdgs__checkpoint_io {
-    ssdgs__writer *writer;
-    const unsigned char *bytes;
-    uint64_t hash;
-} ssdgs__checkpoint_io;
-
-static ssdgs_result ssdgs__checkpoint_write(void *user, void *data, size_t size) {
-    ssdgs__checkpoint_io *io = (ssdgs__checkpoint_io *)user;
-    io->hash = ssdgs__fold(io->hash, data, size);
-    return ssdgs__writer_put(io->writer, data, size);
-}
-
-static ssdgs_result ssdgs__checkpoint_read(void *user, void *data, size_t size) {
-    ssdgs__checkpoint_io *io = (ssdgs__checkpoint_io *)user;
-    memcpy(data, io->bytes, size);
-    io->bytes += size;
-    return SSDGS_OK;
-}
-
 static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char *path) {
     if (!path) return ssdgs__null(trainer->context, "ssdgs_trainer_save", "path");
     ssdgs_result result = ssdgs__trainer_check(trainer);
@@ -11684,12 +11617,10 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
     ssdgs__writer_open(&writer, trainer->context, path);
     ssdgs__checkpoint_head head;
     ssdgs__checkpoint_describe(trainer, &head);
-    ssdgs__checkpoint_io io;
-    io.writer = &writer;
-    io.hash = SSDGS__FOLD_START;
-    ssdgs__checkpoint_write(&io, &head, sizeof head);
-    ssdgs__checkpoint_write(&io, photos, (size_t)trainer->photo_count * sizeof *photos);
-    ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_write, &io);
+    ssdgs__checkpoint_io io = {&writer, NULL, SSDGS__FOLD_START};
+    ssdgs__checkpoint_part(&io, &head, sizeof head);
+    ssdgs__checkpoint_part(&io, photos, (size_t)trainer->photo_count * sizeof *photos);
+    ssdgs__checkpoint_arrays(trainer, &io);
     ssdgs__writer_put(&writer, &io.hash, sizeof io.hash);
     ssdgs__release(trainer->context, photos);
     return ssdgs__writer_close(&writer);
@@ -11822,9 +11753,8 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
                 "%s: its run rounded otherwise (with or without FMA): it goes on, but not bit for bit", path);
         trainer->model->settings = head.settings;
         trainer->model->count = head.count;
-        ssdgs__checkpoint_io io;
-        io.bytes = bytes + sizeof head + photos;
-        result = ssdgs__checkpoint_arrays(trainer, ssdgs__checkpoint_read, &io);
+        ssdgs__checkpoint_io io = {NULL, bytes + sizeof head + photos, 0};
+        ssdgs__checkpoint_arrays(trainer, &io);
         ssdgs__model_changed(trainer->model);
         ssdgs__rearranged(trainer);
         trainer->run = head.run;
@@ -11888,7 +11818,6 @@ SSDGS__SMALL_END
 #define SSDGS__TR 2
 #define SSDGS__TV 4
 #define SSDGS__TARGET
-#define R ssdgs_real
 #define V ssdgs_real
 #define VM int
 #define SSDGS__VW 1
@@ -11918,22 +11847,12 @@ SSDGS__SMALL_END
 #define SSDGS__TR 5 /* of 6 gcc keeps one sum in memory */
 #define SSDGS__TV 2
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("sse2")
-#define R float
+#define SSDGS__MM(name) _mm_##name
 #define V __m128
 #define VM __m128
 #define SSDGS__VW 4
-#define V_LOAD(p) _mm_loadu_ps(p)
-#define V_STORE(p, v) _mm_storeu_ps(p, v)
-#define V_SET(c) _mm_set1_ps((float)(c))
-#define V_ADD(a, b) _mm_add_ps(a, b)
-#define V_SUB(a, b) _mm_sub_ps(a, b)
-#define V_MUL(a, b) _mm_mul_ps(a, b)
-#define V_DIV(a, b) _mm_div_ps(a, b)
 #define V_FMA(a, b, c) _mm_add_ps(_mm_mul_ps(a, b), c)
 #define V_FNMA(a, b, c) _mm_sub_ps(c, _mm_mul_ps(a, b))
-#define V_MIN(a, b) _mm_min_ps(a, b)
-#define V_MAX(a, b) _mm_max_ps(a, b)
-#define V_SQRT(a) _mm_sqrt_ps(a)
 #define V_LT(a, b) _mm_cmplt_ps(a, b)
 #define V_GE(a, b) _mm_cmpge_ps(a, b)
 #define V_AND(m, n) _mm_and_ps(m, n)
@@ -11950,22 +11869,12 @@ SSDGS__SMALL_END
 #define SSDGS__TR 5 /* of 6 gcc keeps one sum in memory */
 #define SSDGS__TV 2
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("avx2,fma")
-#define R float
+#define SSDGS__MM(name) _mm256_##name
 #define V __m256
 #define VM __m256
 #define SSDGS__VW 8
-#define V_LOAD(p) _mm256_loadu_ps(p)
-#define V_STORE(p, v) _mm256_storeu_ps(p, v)
-#define V_SET(c) _mm256_set1_ps((float)(c))
-#define V_ADD(a, b) _mm256_add_ps(a, b)
-#define V_SUB(a, b) _mm256_sub_ps(a, b)
-#define V_MUL(a, b) _mm256_mul_ps(a, b)
-#define V_DIV(a, b) _mm256_div_ps(a, b)
 #define V_FMA(a, b, c) _mm256_fmadd_ps(a, b, c)
 #define V_FNMA(a, b, c) _mm256_fnmadd_ps(a, b, c)
-#define V_MIN(a, b) _mm256_min_ps(a, b)
-#define V_MAX(a, b) _mm256_max_ps(a, b)
-#define V_SQRT(a) _mm256_sqrt_ps(a)
 #define V_LT(a, b) _mm256_cmp_ps(a, b, _CMP_LT_OQ)
 #define V_GE(a, b) _mm256_cmp_ps(a, b, _CMP_GE_OQ)
 #define V_AND(m, n) _mm256_and_ps(m, n)
@@ -11984,22 +11893,12 @@ SSDGS__SMALL_END
 #define SSDGS__TR 6
 #define SSDGS__TV 4
 #define SSDGS__TARGET SSDGS__ATTRIBUTE("avx512f")
-#define R float
+#define SSDGS__MM(name) _mm512_##name
 #define V __m512
 #define VM __mmask16
 #define SSDGS__VW 16
-#define V_LOAD(p) _mm512_loadu_ps(p)
-#define V_STORE(p, v) _mm512_storeu_ps(p, v)
-#define V_SET(c) _mm512_set1_ps((float)(c))
-#define V_ADD(a, b) _mm512_add_ps(a, b)
-#define V_SUB(a, b) _mm512_sub_ps(a, b)
-#define V_MUL(a, b) _mm512_mul_ps(a, b)
-#define V_DIV(a, b) _mm512_div_ps(a, b)
 #define V_FMA(a, b, c) _mm512_fmadd_ps(a, b, c)
 #define V_FNMA(a, b, c) _mm512_fnmadd_ps(a, b, c)
-#define V_MIN(a, b) _mm512_min_ps(a, b)
-#define V_MAX(a, b) _mm512_max_ps(a, b)
-#define V_SQRT(a) _mm512_sqrt_ps(a)
 #define V_LT(a, b) _mm512_cmp_ps_mask(a, b, _CMP_LT_OQ)
 #define V_GE(a, b) _mm512_cmp_ps_mask(a, b, _CMP_GE_OQ)
 #define V_AND(m, n) ((__mmask16)((m) & (n)))
@@ -12019,7 +11918,6 @@ SSDGS__SMALL_END
 #define SSDGS__TR 6
 #define SSDGS__TV 4
 #define SSDGS__TARGET
-#define R float
 #define V float32x4_t
 #define VM uint32x4_t
 #define SSDGS__VW 4
@@ -12052,7 +11950,6 @@ SSDGS__SMALL_END
 #define SSDGS__TR 5
 #define SSDGS__TV 2
 #define SSDGS__TARGET
-#define R float
 #define V v128_t
 #define VM v128_t
 #define SSDGS__VW 4
@@ -12078,16 +11975,21 @@ SSDGS__SMALL_END
 #define V_LDEXP(x, n) wasm_i32x4_add(x, wasm_i32x4_shl(V_ADD(n, V_SET(12582912)), 23))
 #define V_EXPONENT(x) wasm_f32x4_convert_i32x4(wasm_i32x4_sub(wasm_u32x4_shr(x, 23), wasm_i32x4_splat(127)))
 #endif
-
-#define SSDGS__FN static SSDGS__TRAINING SSDGS__TARGET
-#ifdef SSDGS_NO_TRAINER
-#define SSDGS__TRAINS(kernel) NULL
-#else
-#define SSDGS__TRAINS(kernel) kernel
+#ifdef SSDGS__MM /* x86 */
+#define V_LOAD(p) SSDGS__MM(loadu_ps)(p)
+#define V_STORE(p, v) SSDGS__MM(storeu_ps)(p, v)
+#define V_SET(c) SSDGS__MM(set1_ps)((float)(c))
+#define V_ADD(a, b) SSDGS__MM(add_ps)(a, b)
+#define V_SUB(a, b) SSDGS__MM(sub_ps)(a, b)
+#define V_MUL(a, b) SSDGS__MM(mul_ps)(a, b)
+#define V_DIV(a, b) SSDGS__MM(div_ps)(a, b)
+#define V_MIN(a, b) SSDGS__MM(min_ps)(a, b)
+#define V_MAX(a, b) SSDGS__MM(max_ps)(a, b)
+#define V_SQRT(a) SSDGS__MM(sqrt_ps)(a)
 #endif
-#define SSDGS__FI static SSDGS__INLINE SSDGS__TARGET
-#define SSDGS__NV (16 / SSDGS__VW) /* vectors in a 4x4 micro-tile */
+
 #define F(name) SSDGS__NAME(name)
+#define R ssdgs_real /* a float where there are vectors */
 #if SSDGS__ISA == SSDGS__ISA_SCALAR
 #define V_UNROLL SSDGS__UNROLL_SCALAR
 #else
@@ -12096,6 +11998,10 @@ SSDGS__SMALL_END
 #define V_NEG(a) V_SUB(V_SET(0), a)
 #define V_ABS(a) V_MAX(a, V_NEG(a))
 #define V_DOT3(ax, ay, az, bx, by, bz) V_FMA(az, bz, V_FMA(ay, by, V_MUL(ax, bx)))
+#define V_DOT(a, b) V_DOT3((a)[0], (a)[1], (a)[2], (b)[0], (b)[1], (b)[2])
+#define V_DOT_SET(c, b) V_DOT3(V_SET((c)[0]), V_SET((c)[1]), V_SET((c)[2]), (b)[0], (b)[1], (b)[2])
+#define V_STORE_ADD(to, v) V_STORE(to, V_ADD(V_LOAD(to), v)) /* to += v */
+#define V_STORE_FMA(to, a, b) V_STORE(to, V_FMA(a, b, V_LOAD(to)))
 
 /* Sums over lanes are sums of sixteen, SSDGS__NV vectors of them, by halves whatever the width: all
    instruction sets that fuse products and sums give the same bits, and so do all that do not. */
@@ -12142,8 +12048,7 @@ SSDGS__FI void F(sum4)(R *out, const V *a, const V *b, const V *c, const V *d) {
                  d1 = V_ADD(V_ADD(d[0], d[2]), V_ADD(d[1], d[3]));
     const v128_t ab = V_ADD(wasm_i32x4_shuffle(a1, b1, 0, 4, 1, 5), wasm_i32x4_shuffle(a1, b1, 2, 6, 3, 7));
     const v128_t cd = V_ADD(wasm_i32x4_shuffle(c1, d1, 0, 4, 1, 5), wasm_i32x4_shuffle(c1, d1, 2, 6, 3, 7));
-    V_STORE(out,
-            V_ADD(V_LOAD(out), V_ADD(wasm_i64x2_shuffle(ab, cd, 0, 2), wasm_i64x2_shuffle(ab, cd, 1, 3))));
+    V_STORE_ADD(out, V_ADD(wasm_i64x2_shuffle(ab, cd, 0, 2), wasm_i64x2_shuffle(ab, cd, 1, 3)));
 #else
     out[0] += F(sum)(a);
     out[1] += F(sum)(b);
@@ -12424,9 +12329,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
     for (int i = 0; i < 3; i++) {
         V log_scale = V_SEL(off, V_SET(0), V_LOAD(g + (size_t)(SSDGS_LOG_SCALE + i) * stride));
         p->s[i] = V_EXP(V_MAX(V_SET(-SSDGS__RAW_LIMIT), V_MIN(V_SET(SSDGS__RAW_LIMIT), log_scale)));
-        p->t[i] = V_ADD(V_DOT3(V_SET(k->view[4 * i]), V_SET(k->view[4 * i + 1]), V_SET(k->view[4 * i + 2]),
-                               p->x[0], p->x[1], p->x[2]),
-                        V_SET(k->view[4 * i + 3]));
+        p->t[i] = V_ADD(V_DOT_SET(k->view + 4 * i, p->x), V_SET(k->view[4 * i + 3]));
     }
     p->inverse_q = F(rotation)(raw, p->q, p->r);
     p->inverse_z = k->orthographic ? V_SET(1) : V_DIV(V_SET(1), V_MAX(p->t[2], V_SET(k->near_plane)));
@@ -12440,9 +12343,9 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
             p->m[i][j] = V_MUL(
                 p->s[j], V_DOT3(p->row[i][0], p->row[i][1], p->row[i][2], p->r[j], p->r[3 + j], p->r[6 + j]));
     }
-    p->a = V_DOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[0][0], p->m[0][1], p->m[0][2]);
-    p->b = V_DOT3(p->m[0][0], p->m[0][1], p->m[0][2], p->m[1][0], p->m[1][1], p->m[1][2]);
-    p->c = V_DOT3(p->m[1][0], p->m[1][1], p->m[1][2], p->m[1][0], p->m[1][1], p->m[1][2]);
+    p->a = V_DOT(p->m[0], p->m[0]);
+    p->b = V_DOT(p->m[0], p->m[1]);
+    p->c = V_DOT(p->m[1], p->m[1]);
     /* difference of products, its rounding error put back by the fused operation */
     for (int i = 0; i < 3; i++) {
         V u0 = p->m[0][(i + 1) % 3], v0 = p->m[1][(i + 2) % 3], u1 = p->m[0][(i + 2) % 3],
@@ -12450,7 +12353,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
         V product = V_MUL(u1, v1);
         p->cross[i] = V_ADD(V_FMA(u0, v0, V_NEG(product)), V_FNMA(u1, v1, product));
     }
-    p->det0 = V_DOT3(p->cross[0], p->cross[1], p->cross[2], p->cross[0], p->cross[1], p->cross[2]);
+    p->det0 = V_DOT(p->cross, p->cross);
     if (k->blur == SSDGS_BLUR_ADD) {
         p->h = V_SET(k->variance);
     } else {
@@ -12491,7 +12394,7 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
             V_SET(0), V_MUL(V_SET(2 * 0.69314718055994531), V_SUB(log2_opacity, V_SET(k->log2_threshold))));
         const V ex = V_SQRT(V_MUL(reach, V_ADD(p.a, p.h)));
         const V ey = V_SQRT(V_MUL(reach, V_ADD(p.c, p.h)));
-        const V d = k->by_distance ? V_SQRT(V_DOT3(p.t[0], p.t[1], p.t[2], p.t[0], p.t[1], p.t[2])) : p.t[2];
+        const V d = k->by_distance ? V_SQRT(V_DOT(p.t, p.t)) : p.t[2];
         /* NaN fails every comparison, so nothing that is not finite is drawn */
         VM drawn = V_AND(V_GE(log2_opacity, V_SET(k->log2_threshold)),
                          V_AND(V_LT(V_SET(k->near_plane), p.t[2]), V_LT(p.t[2], V_SET(1e30))));
@@ -12544,10 +12447,9 @@ SSDGS__FI void F(fade_backward)(const ssdgs__projection *k, const F(rim) * rim, 
                                    V_DIV(V_MUL(g, rim->inverse_near), V_MAX(p->rise, V_SET(1e-20))), zero));
     for (int j = 0; j < 3; j++) {
         const V by_axis = V_MUL(steep, p->axis[j]), along = V_MUL(by_axis, V_MUL(p->s[j], p->inverse_z));
-        R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride;
         const V held = V_ABS(V_LOAD(raw + (size_t)(SSDGS_LOG_SCALE + j) * stride));
-        V_STORE(d_scale, V_ADD(V_LOAD(d_scale),
-                               V_SEL(V_LT(held, V_SET(SSDGS__RAW_LIMIT)), V_MUL(by_axis, p->axis[j]), zero)));
+        V_STORE_ADD(gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride,
+                    V_SEL(V_LT(held, V_SET(SSDGS__RAW_LIMIT)), V_MUL(by_axis, p->axis[j]), zero));
         for (int l = 0; l < 3; l++) {
             dr[3 * l + j] = V_FMA(along, V_SET(k->view[8 + l]), dr[3 * l + j]);
             view_sum[8 + l][v] = V_FMA(along, p->r[3 * l + j], view_sum[8 + l][v]);
@@ -12600,7 +12502,6 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             const V n0 = V_MUL(ux_by_high, along0), n1 = V_MUL(p.wy, p.m[1][j]);
             const V mn0 = V_FMA(g[2], n0, V_MUL(g[3], n1)), mn1 = V_FMA(g[3], n0, V_MUL(g[4], n1));
             V dm0 = V_MUL(p.ux, mn0), dm1 = V_FMA(p.uy, mn0, V_MUL(p.wy, mn1));
-            R *d_scale = gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i;
             V raw = V_LOAD(gaussians + (size_t)(SSDGS_LOG_SCALE + j) * stride + i),
               ds = V_FMA(n0, mn0, V_MUL(n1, mn1));
             if (k->compensate) { /* ln opacity += (ln det0 - ln det) / 2 */
@@ -12612,8 +12513,8 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
                 dm1 = V_ADD(dm1, push1);
                 ds = V_FMA(push0, p.m[0][j], V_FMA(push1, p.m[1][j], ds));
             }
-            V_STORE(d_scale,
-                    V_ADD(V_LOAD(d_scale), V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__RAW_LIMIT)), ds, V_SET(0))));
+            V_STORE_ADD(gradient + (size_t)(SSDGS_LOG_SCALE + j) * gradient_stride + i,
+                        V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__RAW_LIMIT)), ds, V_SET(0)));
             dm0 = V_MUL(dm0, p.s[j]);
             dm1 = V_MUL(dm1, p.s[j]);
             for (int l = 0; l < 3; l++) {
@@ -12628,25 +12529,17 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
         (k, &rim, &p, g[5], gaussians + i, stride, gradient + i, gradient_stride, dr, push, view_sum, v);
         V dq[4];
         F(rotation_backward)(dq, p.q, p.inverse_q, dr);
-        for (int j = 0; j < 4; j++) {
-            R *d = gradient + (size_t)(SSDGS_ROTATION + j) * gradient_stride + i;
-            V_STORE(d, V_ADD(V_LOAD(d), dq[j]));
-        }
-        { /* opacity = sigmoid(logit): d ln o / d logit = 1 - o */
-            R *d = gradient + (size_t)SSDGS_OPACITY * gradient_stride + i;
-            V raw = V_LOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
-            V logit = V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__RAW_LIMIT)), V_MUL(g[5], p.clear), V_SET(0));
-            V_STORE(d, V_ADD(V_LOAD(d), logit));
-        }
+        for (int j = 0; j < 4; j++)
+            V_STORE_ADD(gradient + (size_t)(SSDGS_ROTATION + j) * gradient_stride + i, dq[j]);
+        const V raw = V_LOAD(gaussians + (size_t)SSDGS_OPACITY * stride + i);
+        V_STORE_ADD(gradient + (size_t)SSDGS_OPACITY * gradient_stride + i, /* d ln o / d logit = 1 - o */
+                    V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__RAW_LIMIT)), V_MUL(g[5], p.clear), V_SET(0)));
         V dt[3];
         dt[2] = V_ADD(g[7], push[2]);
         for (int l = 0; l < 2; l++) { /* J: focal / z, -focal t / z^2; centre: focal t / z */
             V focal = V_SET(l ? k->fy : k->fx), scaled = V_MUL(focal, p.inverse_z),
               slope = V_MUL(p.t[l], p.inverse_z);
-            V w0 = V_SET(k->view[4 * l]), w1 = V_SET(k->view[4 * l + 1]), w2 = V_SET(k->view[4 * l + 2]);
-            V dj = V_DOT3(du[l][0], du[l][1], du[l][2], w0, w1, w2);
-            V dj2 = V_DOT3(du[l][0], du[l][1], du[l][2], V_SET(k->view[8]), V_SET(k->view[9]),
-                           V_SET(k->view[10]));
+            V dj = V_DOT_SET(k->view + 4 * l, du[l]), dj2 = V_DOT_SET(k->view + 8, du[l]);
             V dslope = V_ADD(push[l], V_FNMA(scaled, dj2, V_MUL(focal, g[l]))); /* slope = t / z stands in J
                                                                                and in the centre, and fades */
             dt[l] = V_MUL(dslope, p.inverse_z);
@@ -12658,10 +12551,9 @@ SSDGS__FN void F(project_backward)(const ssdgs__projection *k, const R *gaussian
             }
         }
         for (int j = 0; j < 3; j++) {
-            R *d = gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i;
-            V dx =
-                V_DOT3(dt[0], dt[1], dt[2], V_SET(k->view[j]), V_SET(k->view[4 + j]), V_SET(k->view[8 + j]));
-            V_STORE(d, V_ADD(V_LOAD(d), dx));
+            V_STORE_ADD(
+                gradient + (size_t)(SSDGS_POSITION + j) * gradient_stride + i,
+                V_DOT3(dt[0], dt[1], dt[2], V_SET(k->view[j]), V_SET(k->view[4 + j]), V_SET(k->view[8 + j])));
             for (int l = 0; l < 3; l++) view_sum[4 * j + l][v] = V_FMA(dt[j], p.x[l], view_sum[4 * j + l][v]);
             view_sum[4 * j + 3][v] = V_ADD(view_sum[4 * j + 3][v], dt[j]);
         }
@@ -13384,8 +13276,7 @@ SSDGS__FI void F(composite_layers_backward)(const int layers, const ssdgs__tile 
                     V_UNROLL for (int v = 0; v < width / SSDGS__VW; v++) sum[v] =
                         V_FMA(w, V_LOAD(rows + i * width + v * SSDGS__VW), sum[v]);
                 }
-                V_UNROLL for (int v = 0; v < width / SSDGS__VW; v++)
-                    V_STORE(out + v * SSDGS__VW, V_ADD(V_LOAD(out + v * SSDGS__VW), sum[v]));
+                V_UNROLL for (int v = 0; v < width / SSDGS__VW; v++) V_STORE_ADD(out + v * SSDGS__VW, sum[v]);
             }
             V_UNROLL for (int v = 0; v < SSDGS__NV; v++) {
                 V_STORE(transmittance[micro] + v * SSDGS__VW, F(unstopped)(t[v], stop));
@@ -13499,7 +13390,7 @@ SSDGS__FN void F(series)(const R *series, const R *middle, const R *x, int lanes
                     y1 = V_FMA(dz, V_SET(of[8]), V_FMA(dy, V_SET(of[7]), V_SET(of[2]))),
                     z1 = V_FMA(dz, V_SET(of[9]), V_SET(of[3]));
             const V value = V_FMA(dx, x1, V_FMA(dy, y1, V_FMA(dz, z1, V_SET(of[0]))));
-            V_STORE(sums + k * SSDGS__BLOCK + s, V_ADD(value, V_LOAD(sums + k * SSDGS__BLOCK + s)));
+            V_STORE_ADD(sums + k * SSDGS__BLOCK + s, value);
         }
     }
 }
@@ -13556,22 +13447,12 @@ SSDGS__FI void F(dense_columns)(const ssdgs__product *p, const ssdgs__offsets *d
     for (; left; left--) {
         const int rows = (p->rows - row + left - 1) / left;
         const uint16_t *list = p->row_list + row;
-        switch (rows) { /* SSDGS__TR at most */
-        case 6:
-            if (SSDGS__TR > 5) F(dense_tile)(6, p, depth, vectors, list, column);
-            break;
-        case 5:
-            if (SSDGS__TR > 4) F(dense_tile)(5, p, depth, vectors, list, column);
-            break;
-        case 4:
-            if (SSDGS__TR > 3) F(dense_tile)(4, p, depth, vectors, list, column);
-            break;
-        case 3:
-            if (SSDGS__TR > 2) F(dense_tile)(3, p, depth, vectors, list, column);
-            break;
-        case 2: F(dense_tile)(2, p, depth, vectors, list, column); break;
-        default: F(dense_tile)(1, p, depth, vectors, list, column);
-        }
+        if (SSDGS__TR > 5 && rows == 6) F(dense_tile)(6, p, depth, vectors, list, column);
+        else if (SSDGS__TR > 4 && rows == 5) F(dense_tile)(5, p, depth, vectors, list, column);
+        else if (SSDGS__TR > 3 && rows == 4) F(dense_tile)(4, p, depth, vectors, list, column);
+        else if (SSDGS__TR > 2 && rows == 3) F(dense_tile)(3, p, depth, vectors, list, column);
+        else if (rows == 2) F(dense_tile)(2, p, depth, vectors, list, column);
+        else F(dense_tile)(1, p, depth, vectors, list, column);
         row += rows;
     }
 }
@@ -13624,10 +13505,9 @@ SSDGS__FN void F(row_sums)(R *sums, size_t stride, const R *rows, const uint16_t
     for (int i = 0; i < count; i++)
         for (int j = 0; j < 16; j += SSDGS__VW) {
             const R *row = rows + list[i] * SSDGS__BLOCK + j;
-            R *out = sums + list[i] * stride + j;
             V sum = V_LOAD(row);
             for (int s = 16; s < SSDGS__BLOCK; s += 16) sum = V_ADD(sum, V_LOAD(row + s));
-            V_STORE(out, V_ADD(V_LOAD(out), sum));
+            V_STORE_ADD(sums + list[i] * stride + j, sum);
         }
 }
 
@@ -13666,7 +13546,7 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
                 sum = V_FMA(power, turn, sum);
                 power = V_ADD(power, power);
             }
-            V_STORE(din + d * SSDGS__BLOCK + s, V_FMA(sum, V_SET(scale), V_LOAD(din + d * SSDGS__BLOCK + s)));
+            V_STORE_FMA(din + d * SSDGS__BLOCK + s, sum, V_SET(scale));
         }
 }
 
@@ -13676,11 +13556,11 @@ SSDGS__FN void F(encode_backward)(R *din, const R *dout, const R *out, R scale, 
 
 /* h = wi + wo made a unit vector, whether there is one, 1 - wo.h and its fifth power. */
 SSDGS__FI void F(half_vector)(V h[3], const V wo[3], V *inverse_h, VM *half, V *missing, V *fifth) {
-    V h2 = V_DOT3(h[0], h[1], h[2], h[0], h[1], h[2]);
+    V h2 = V_DOT(h, h);
     *half = V_GE(h2, V_SET(1e-12)); /* wi = -wo has no half vector: no highlight there */
     *inverse_h = V_DIV(V_SET(1), V_SQRT(V_MAX(h2, V_SET(1e-12))));
     for (int i = 0; i < 3; i++) h[i] = V_MUL(h[i], *inverse_h);
-    *missing = V_SUB(V_SET(1), V_DOT3(wo[0], wo[1], wo[2], h[0], h[1], h[2]));
+    *missing = V_SUB(V_SET(1), V_DOT(wo, h));
     *missing = V_MAX(
         V_SET(0), V_MIN(V_SET(1), *missing)); /* where wi is nearly -wo, h is rounding and wo.h any number */
     h2 = V_MUL(*missing, *missing);
@@ -13704,10 +13584,8 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, cons
         g->wi[i] = k->directional ? V_SET(k->light[i]) : V_SUB(V_SET(k->light[i]), x[i]);
         g->wo[i] = V_SUB(V_SET(k->eye[i]), x[i]);
     }
-    const V d2 =
-        V_MAX(V_DOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), V_SET(k->least_distance2));
-    const V e2 =
-        V_MAX(V_DOT3(g->wo[0], g->wo[1], g->wo[2], g->wo[0], g->wo[1], g->wo[2]), V_SET(k->least_distance2));
+    const V d2 = V_MAX(V_DOT(g->wi, g->wi), V_SET(k->least_distance2));
+    const V e2 = V_MAX(V_DOT(g->wo, g->wo), V_SET(k->least_distance2));
     g->irradiance = k->directional ? V_SET(1) : V_DIV(V_SET(1), d2);
     g->inverse_light = k->directional ? V_SET(1) : V_SQRT(g->irradiance);
     g->inverse_eye = V_DIV(V_SET(1), V_SQRT(e2));
@@ -13727,8 +13605,8 @@ SSDGS__FI void F(geometry_lanes)(F(geometry) * g, const ssdgs__lighting *k, cons
 /* One basis at the local half vector h (eq. 12). b: x, y, z axes (9), lambda, mu. With dh NULL only the
    value; else also the exponent's derivatives: to h (3), and to the x axis, the y axis, lambda and mu (8). */
 SSDGS__FI V F(asg)(const R *b, const V h[3], V *dh, V *db) {
-    const V x = V_DOT3(V_SET(b[0]), V_SET(b[1]), V_SET(b[2]), h[0], h[1], h[2]);
-    const V y = V_DOT3(V_SET(b[3]), V_SET(b[4]), V_SET(b[5]), h[0], h[1], h[2]);
+    const V x = V_DOT_SET(b, h);
+    const V y = V_DOT_SET(b + 3, h);
     const V value = V_EXP(V_NEG(V_FMA(V_MUL(V_SET(b[9]), x), x, V_MUL(V_MUL(V_SET(b[10]), y), y))));
     if (dh) {
         const V dx = V_MUL(V_SET(-2 * b[9]), x), dy = V_MUL(V_SET(-2 * b[10]), y);
@@ -13779,10 +13657,7 @@ SSDGS__FN void F(reflect)(const ssdgs__lighting *k, const R *gauss, R *rows) {
 }
 
 /* Where least_distance2 holds the length that a direction was divided by: it is shorter than 1 there. */
-SSDGS__FI VM F(held)(const V direction[3]) {
-    return V_LT(V_DOT3(direction[0], direction[1], direction[2], direction[0], direction[1], direction[2]),
-                V_SET(0.99));
-}
+SSDGS__FI VM F(held)(const V direction[3]) { return V_LT(V_DOT(direction, direction), V_SET(0.99)); }
 
 /* drows: gradients of the rows above. Adds to dgauss (CHANNELS, BLOCK) and to the lane sums of the light (3),
    the eye (3) and the bases (8 x 12), each (16 lanes). */
@@ -13805,9 +13680,8 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             const V dlog = V_MUL(V_MUL(V_SET(0.5), dgloss), F(lobe_height)(gauss + s));
             for (int j = 0; j < 2; j++) {
                 const V raw = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s);
-                R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
-                V_STORE(dw,
-                        V_ADD(V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__SHARPEST)), dlog, V_SET(0)), V_LOAD(dw)));
+                V_STORE_ADD(dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s,
+                            V_SEL(V_LT(V_ABS(raw), V_SET(SSDGS__SHARPEST)), dlog, V_SET(0)));
             }
         }
         const V dlobe = V_MUL(df, g.fresnel);
@@ -13815,15 +13689,14 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
             for (int j = 0; j < SSDGS_ASG_COUNT; j++) {
                 V raw = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s), weight = F(softplus)(raw),
                   de[3], db[8];
-                R *dw = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
                 const V lobe = F(asg)(k->basis + 12 * j, g.local, de, db);
                 d = V_FMA(weight, lobe, d);
-                V_STORE(dw, V_FMA(V_MUL(dlobe, lobe), F(sigmoid)(raw), V_LOAD(dw)));
+                V_STORE_FMA(dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s, V_MUL(dlobe, lobe),
+                            F(sigmoid)(raw));
                 const V push = V_MUL(V_MUL(dlobe, weight), lobe);
                 for (int i = 0; i < 3; i++) dlocal[i] = V_FMA(push, de[i], dlocal[i]);
                 for (int i = 0; i < 8; i++) { /* the z axis, rows 6 to 8, has no part in it */
-                    R *sum = lane_sums + (6 + 12 * j + (i < 6 ? i : i + 3)) * 16 + s % 16;
-                    V_STORE(sum, V_FMA(push, db[i], V_LOAD(sum)));
+                    V_STORE_FMA(lane_sums + (6 + 12 * j + (i < 6 ? i : i + 3)) * 16 + s % 16, push, db[i]);
                 }
             }
         /* F = F0 + (1 - F0) (1 - wo.h)^5 */
@@ -13831,16 +13704,14 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         const V dwoh = V_MUL(V_MUL(df, d), V_MUL(V_SET(-5 * (1 - SSDGS__F0)), V_MUL(missing2, missing2)));
         V dr[9], dh[3];
         for (int i = 0; i < 3; i++) {
-            dh[i] =
-                V_FMA(dwoh, g.wo[i],
-                      V_DOT3(g.r[3 * i], g.r[3 * i + 1], g.r[3 * i + 2], dlocal[0], dlocal[1], dlocal[2]));
+            dh[i] = V_FMA(dwoh, g.wo[i], V_DOT(g.r + 3 * i, dlocal));
             dwo[i] = V_FMA(dwoh, g.h[i], dwo[i]);
             for (int j = 0; j < 3; j++) dr[3 * i + j] = V_MUL(g.h[i], dlocal[j]);
         }
         /* f_d = max(0, n.wi) */
         const V dcosine =
             V_SEL(V_LT(V_SET(0), g.cosine), V_LOAD(drows + SSDGS__COSINE * SSDGS__BLOCK + s), V_SET(0));
-        const V along_h = V_DOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+        const V along_h = V_DOT(g.h, dh);
         for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo| */
             const V dsum = V_MUL(V_FNMA(g.h[i], along_h, dh[i]), g.inverse_h);
             dwi[i] = V_FMA(dcosine, g.r[3 * i + 2], V_ADD(dwi[i], dsum));
@@ -13849,27 +13720,22 @@ SSDGS__FN void F(reflect_backward)(const ssdgs__lighting *k, const R *gauss, con
         }
         V dq[4];
         F(rotation_backward)(dq, g.q, g.inverse_q, dr);
-        for (int i = 0; i < 4; i++) {
-            R *out = dgauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s;
-            V_STORE(out, V_ADD(V_LOAD(out), dq[i]));
-        }
+        for (int i = 0; i < 4; i++) V_STORE_ADD(dgauss + (SSDGS_FRAME + i) * SSDGS__BLOCK + s, dq[i]);
         /* wi = (light - x) / d, irradiance = 1 / d^2; wo alike */
-        V along_light = V_DOT3(g.wi[0], g.wi[1], g.wi[2], dwi[0], dwi[1], dwi[2]);
+        V along_light = V_DOT(g.wi, dwi);
         if (!k->directional)
             along_light = V_FMA(V_MUL(V_SET(2), g.irradiance),
                                 V_LOAD(drows + SSDGS__IRRADIANCE * SSDGS__BLOCK + s), along_light);
         along_light = V_SEL(F(held)(g.wi), V_SET(0), along_light);
-        const V along_eye =
-            V_SEL(F(held)(g.wo), V_SET(0), V_DOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]));
+        const V along_eye = V_SEL(F(held)(g.wo), V_SET(0), V_DOT(g.wo, dwo));
         for (int i = 0; i < 3; i++) {
             R *out = dgauss + (SSDGS_POSITION + i) * SSDGS__BLOCK + s;
             const V to_light = V_MUL(V_FNMA(g.wi[i], along_light, dwi[i]), g.inverse_light);
             const V to_eye = V_MUL(V_FNMA(g.wo[i], along_eye, dwo[i]), g.inverse_eye);
             V_STORE(out, V_SUB(V_LOAD(out), k->directional ? to_eye : V_ADD(to_light, to_eye)));
             out = lane_sums + i * 16 + s % 16;
-            V_STORE(out, V_ADD(V_LOAD(out), to_light));
-            V_STORE(out + 3 * 16,
-                    V_ADD(V_LOAD(out + 3 * 16), to_eye)); /* the eye's, after the light's three */
+            V_STORE_ADD(out, to_light);
+            V_STORE_ADD(out + 3 * 16, to_eye); /* the eye's, after the light's three */
         }
     }
 }
@@ -13922,7 +13788,7 @@ SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdg
     for (int i = 0; i < 3; i++)
         g->ray[i] = V_FMA(V_SET(k->view[i]), g->to_camera[0],
                           V_FMA(V_SET(k->view[4 + i]), g->to_camera[1], V_SET(k->view[8 + i])));
-    V d2 = V_DOT3(g->ray[0], g->ray[1], g->ray[2], g->ray[0], g->ray[1], g->ray[2]);
+    V d2 = V_DOT(g->ray, g->ray);
     g->inverse_ray = V_DIV(V_SET(1), V_SQRT(d2));
     V at[3];
     for (int i = 0; i < 3; i++) {
@@ -13930,7 +13796,7 @@ SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdg
         g->wo[i] = V_NEG(V_MUL(g->ray[i], g->inverse_ray));
         g->wi[i] = k->directional ? V_SET(k->light[i]) : V_SUB(V_SET(k->light[i]), at[i]);
     }
-    d2 = V_MAX(V_DOT3(g->wi[0], g->wi[1], g->wi[2], g->wi[0], g->wi[1], g->wi[2]), V_SET(k->least_distance2));
+    d2 = V_MAX(V_DOT(g->wi, g->wi), V_SET(k->least_distance2));
     g->inverse_light = k->directional ? V_SET(1) : V_DIV(V_SET(1), V_SQRT(d2));
     for (int i = 0; i < 3; i++) {
         g->wi[i] = V_MUL(g->wi[i], g->inverse_light);
@@ -13939,13 +13805,13 @@ SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdg
     F(half_vector)(g->h, g->wo, &g->inverse_h, &g->half, &g->missing, &g->fifth);
     g->fresnel = V_FMA(V_SUB(V_SET(1), g->f0), g->fifth, g->f0);
     for (int i = 0; i < 3; i++) g->n[i] = V_LOAD(normal + 16 * i);
-    d2 = V_DOT3(g->n[0], g->n[1], g->n[2], g->n[0], g->n[1], g->n[2]);
+    d2 = V_DOT(g->n, g->n);
     g->half = V_AND(
         g->half, V_GE(d2, V_SET(SSDGS__THIN * SSDGS__THIN))); /* nor is there a highlight without a normal */
     g->inverse_n = V_DIV(V_SET(1), V_SQRT(V_MAX(d2, V_SET(SSDGS__THIN * SSDGS__THIN))));
     for (int i = 0; i < 3; i++) g->n[i] = V_MUL(g->n[i], g->inverse_n);
-    g->along = V_DOT3(g->n[0], g->n[1], g->n[2], g->h[0], g->h[1], g->h[2]);
-    g->cosine = V_MAX(V_SET(0), V_DOT3(g->n[0], g->n[1], g->n[2], g->wi[0], g->wi[1], g->wi[2]));
+    g->along = V_DOT(g->n, g->h);
+    g->cosine = V_MAX(V_SET(0), V_DOT(g->n, g->wi));
     g->inverse_woh = V_DIV(V_SET(1), V_MAX(V_SET(SSDGS__GRAZING), V_SUB(V_SET(1), g->missing)));
     g->microfacet = V_MUL(g->cosine, V_MUL(g->inverse_woh, g->inverse_woh));
     for (int i = 0; i < 3; i++) {
@@ -13959,7 +13825,7 @@ SSDGS__FI void F(highlight_geometry_lanes)(F(highlight_geometry) * g, const ssdg
                                        V_FMA(V_LOAD(q + SSDGS__TILE_LAYER + 16 * i), g->p[j][(i + 1) % 3],
                                              V_MUL(V_LOAD(q + SSDGS__TILE_LAYER + 16 * ((i + 2) % 3)),
                                                    g->p[j][(i + 2) % 3]))));
-        g->q[j] = V_DOT3(g->row[j][0], g->row[j][1], g->row[j][2], g->p[j][0], g->p[j][1], g->p[j][2]);
+        g->q[j] = V_DOT(g->row[j], g->p[j]);
     }
 }
 
@@ -14045,8 +13911,7 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
             F(arrival_lanes)(&arrival, k, at, V_LOAD(s));
             const V factor = arrival.factor;
             V_STORE(s + 16, factor);
-            for (int c = 0; c < 3; c++)
-                V_STORE(at + 16 * c, V_FMA(factor, V_LOAD(diffuse + 16 * c), V_LOAD(at + 16 * c)));
+            for (int c = 0; c < 3; c++) V_STORE_FMA(at + 16 * c, factor, V_LOAD(diffuse + 16 * c));
             if (!V_BITS(V_LT(V_SET(0), V_MAX(V_MAX(V_LOAD(m), V_LOAD(m + 16)), V_LOAD(m + 32))))) continue;
             F(highlight_geometry) g;
             F(highlight_geometry_lanes)(&g, k, pixel, at);
@@ -14054,8 +13919,7 @@ SSDGS__FN void F(highlight)(const ssdgs__lighting *k, const ssdgs__tile *tile, R
             const V value =
                 V_MUL(factor,
                       V_SEL(g.half, V_MUL(V_MUL(g.microfacet, g.fresnel), F(glow)(k, g.q, lobes)), V_SET(0)));
-            for (int c = 0; c < 3; c++)
-                V_STORE(at + 16 * c, V_FMA(value, V_LOAD(m + 16 * c), V_LOAD(at + 16 * c)));
+            for (int c = 0; c < 3; c++) V_STORE_FMA(at + 16 * c, value, V_LOAD(m + 16 * c));
         }
     }
 }
@@ -14129,14 +13993,13 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                 const V scale = V_MUL(dq[j], g.inverse_cover);
                 for (int i = 0; i < 3; i++) {
                     const V twice = V_MUL(V_MUL(V_SET(2), scale), g.p[j][i]);
-                    R *cross = d_q + SSDGS__TILE_LAYER + 16 * i;
-                    V_STORE(d_q + 16 * i, V_FMA(V_MUL(scale, g.p[j][i]), g.p[j][i], V_LOAD(d_q + 16 * i)));
-                    V_STORE(cross, V_FMA(twice, g.p[j][(i + 1) % 3], V_LOAD(cross)));
+                    V_STORE_FMA(d_q + 16 * i, V_MUL(scale, g.p[j][i]), g.p[j][i]);
+                    V_STORE_FMA(d_q + SSDGS__TILE_LAYER + 16 * i, twice, g.p[j][(i + 1) % 3]);
                 }
             }
             V dh[3];
             for (int i = 0; i < 3; i++) dh[i] = V_MUL(V_MUL(V_SET(2), dq[0]), g.row[0][i]); /* p's */
-            const V dh_along = V_DOT3(g.n[0], g.n[1], g.n[2], dh[0], dh[1], dh[2]);
+            const V dh_along = V_DOT(g.n, dh);
             V dn[3], dwo[3];
             for (int i = 0; i < 3; i++) { /* p = h - n (n.h) */
                 dn[i] = V_FMA(dcosine, g.wi[i], V_NEG(V_FMA(g.along, dh[i], V_MUL(g.h[i], dh_along))));
@@ -14144,20 +14007,19 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                               V_FMA(V_MUL(V_SET(2), dq[1]), g.row[1][i], V_FNMA(g.n[i], dh_along, dh[i])));
                 dwo[i] = V_MUL(dwoh, g.h[i]);
             }
-            const V dn_along = V_DOT3(g.n[0], g.n[1], g.n[2], dn[0], dn[1], dn[2]);
+            const V dn_along = V_DOT(g.n, dn);
             for (int i = 0; i < 3; i++) {
-                R *out = d + SSDGS__NORMAL_LAYER * SSDGS__TILE_LAYER + 16 * i;
-                V_STORE(out, V_FMA(V_FNMA(g.n[i], dn_along, dn[i]), g.inverse_n, V_LOAD(out)));
+                V_STORE_FMA(d + SSDGS__NORMAL_LAYER * SSDGS__TILE_LAYER + 16 * i,
+                            V_FNMA(g.n[i], dn_along, dn[i]), g.inverse_n);
             }
-            const V along_h = V_DOT3(g.h[0], g.h[1], g.h[2], dh[0], dh[1], dh[2]);
+            const V along_h = V_DOT(g.h, dh);
             for (int i = 0; i < 3; i++) { /* h = (wi + wo) / |wi + wo|; dh becomes wi's */
                 const V dsum = V_MUL(V_FNMA(g.h[i], along_h, dh[i]), g.inverse_h);
                 dwo[i] = V_ADD(dwo[i], dsum);
                 dh[i] = V_FMA(dcosine, g.n[i], dsum);
             }
-            const V along_light =
-                V_SEL(F(held)(g.wi), V_SET(0), V_DOT3(g.wi[0], g.wi[1], g.wi[2], dh[0], dh[1], dh[2]));
-            const V along_eye = V_DOT3(g.wo[0], g.wo[1], g.wo[2], dwo[0], dwo[1], dwo[2]);
+            const V along_light = V_SEL(F(held)(g.wi), V_SET(0), V_DOT(g.wi, dh));
+            const V along_eye = V_DOT(g.wo, dwo);
             V ddepth = V_SET(0);
             V dat[3];
             /* wi = (light - at) / |light - at|, at = eye + depth ray, wo = -ray / |ray| */
@@ -14174,8 +14036,8 @@ SSDGS__FN void F(highlight_backward)(const ssdgs__lighting *k, const ssdgs__tile
                 sum[12 + i][v] = V_ADD(dray, sum[12 + i][v]);
             }
             R *ddepth_layer = d + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER;
-            V_STORE(ddepth_layer, V_FMA(ddepth, g.inverse_cover, V_LOAD(ddepth_layer)));
-            V_STORE(ddepth_layer + 16, V_FMA(df0, g.inverse_cover, V_LOAD(ddepth_layer + 16)));
+            V_STORE_FMA(ddepth_layer, ddepth, g.inverse_cover);
+            V_STORE_FMA(ddepth_layer + 16, df0, g.inverse_cover);
             /* -A dL/dA: all are divided by A */
             dcover =
                 V_FMA(dq[0], g.q[0], V_FMA(dq[1], g.q[1], V_FMA(ddepth, g.depth, V_FMA(df0, g.f0, dcover))));
@@ -14227,7 +14089,6 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
         for (int j = 0; j < 2; j++) {
             const V log_sharp = V_LOAD(gauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s),
                     sharp = F(sharpness)(log_sharp);
-            R *dsharp = dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s;
             V product = V_SET(0);
             for (int i = 0; i < 3; i++) {
                 const int next = (i + 1) % 3, before = (i + 2) % 3;
@@ -14239,19 +14100,17 @@ SSDGS__FN void F(lobe_backward)(const R *gauss, const R *drows, R *dgauss) {
                 product = V_FMA(V_MUL(V_SET(0.5), row), r[3 * i + j], product);
             }
             product = V_SEL(V_LT(V_ABS(log_sharp), V_SET(SSDGS__SHARPEST)), V_MUL(product, sharp), V_SET(0));
-            V_STORE(dsharp, V_ADD(V_LOAD(dsharp), product));
+            V_STORE_ADD(dgauss + (SSDGS_ASG_WEIGHT + j) * SSDGS__BLOCK + s, product);
         }
         V dq[4];
         F(rotation_backward)(dq, q, inverse_q, dr);
-        for (int i = 0; i < 4; i++, out += SSDGS__BLOCK) V_STORE(out, V_ADD(V_LOAD(out), dq[i]));
+        for (int i = 0; i < 4; i++, out += SSDGS__BLOCK) V_STORE_ADD(out, dq[i]);
         const V f0 = F(reflectance)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s));
         out = dgauss + (SSDGS_ASG_WEIGHT + 2) * SSDGS__BLOCK + s;
-        V_STORE(out, V_FMA(V_FNMA(f0, f0, f0), V_LOAD(drows + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK + s),
-                           V_LOAD(out)));
+        V_STORE_FMA(out, V_FNMA(f0, f0, f0), V_LOAD(drows + SSDGS__LOBE_FRESNEL * SSDGS__BLOCK + s));
         const V soft = F(sigmoid)(V_LOAD(gauss + (SSDGS_ASG_WEIGHT + 3) * SSDGS__BLOCK + s));
         out += SSDGS__BLOCK;
-        V_STORE(out, V_FMA(V_FNMA(soft, soft, soft), V_LOAD(drows + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s),
-                           V_LOAD(out)));
+        V_STORE_FMA(out, V_FNMA(soft, soft, soft), V_LOAD(drows + SSDGS__LOBE_SOFTNESS * SSDGS__BLOCK + s));
     }
 }
 
@@ -14328,30 +14187,26 @@ SSDGS__FN void F(colour)(const ssdgs__lighting *k, const ssdgs__colour_in *in, R
                 const V kd = F(softplus)(V_LOAD(gauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s));
                 const V f = V_MUL(V_MUL(kd, V_SET(0.31830988618379067)),
                                   V_LOAD(rows + SSDGS__COSINE * SSDGS__BLOCK + s));
-                V_STORE(o + c * SSDGS__BLOCK, V_FMA(f, lit, V_LOAD(o + c * SSDGS__BLOCK)));
+                V_STORE_FMA(o + c * SSDGS__BLOCK, f, lit);
             }
             if (in->kept) {
                 const V own =
                     V_MUL(V_LOAD(in->kept + c * SSDGS__BLOCK + s), V_LOAD(in->kept + 3 * SSDGS__BLOCK + s));
-                V_STORE(o + c * SSDGS__BLOCK,
-                        V_FMA(own, k->deferred ? V_SET(1) : factor, V_LOAD(o + c * SSDGS__BLOCK)));
+                V_STORE_FMA(o + c * SSDGS__BLOCK, own, k->deferred ? V_SET(1) : factor);
             }
             if (k->specular) {
                 const V ks = F(softplus)(V_LOAD(gauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s));
                 const V f = V_MUL(ks, V_LOAD(rows + SSDGS__GLOSS * SSDGS__BLOCK + s));
-                V_STORE(o + (SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK,
-                        V_FMA(f, lit, V_LOAD(o + (SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK)));
+                V_STORE_FMA(o + (SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK, f, lit);
             }
             if (k->scattering) {
                 const V kss = F(softplus)(V_LOAD(gauss + (SSDGS_SCATTERING + c) * SSDGS__BLOCK + s));
                 if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, NULL);
-                V_STORE(o + (SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK,
-                        V_FMA(V_MUL(kss, profile), k->shadow_on_scattering ? shaded : power,
-                              V_LOAD(o + (SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK)));
+                V_STORE_FMA(o + (SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK, V_MUL(kss, profile),
+                            k->shadow_on_scattering ? shaded : power);
             }
         }
-        V_STORE(o + SSDGS__OUT_SHADOW * SSDGS__BLOCK,
-                V_ADD(factor, V_LOAD(o + SSDGS__OUT_SHADOW * SSDGS__BLOCK)));
+        V_STORE_ADD(o + SSDGS__OUT_SHADOW * SSDGS__BLOCK, factor);
     }
 }
 
@@ -14379,8 +14234,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
                 const V push = V_MUL(V_LOAD(ddiffuse + c * SSDGS__BLOCK + s), V_SET(k->intensity[c])),
                         lit = V_MUL(V_MUL(push, irradiance), direct);
                 R *to = dgauss + (SSDGS_DIFFUSE + c) * SSDGS__BLOCK + s;
-                V_STORE(to, V_FMA(V_MUL(V_MUL(lit, cosine), V_SET(0.31830988618379067)), F(sigmoid)(raw),
-                                  V_LOAD(to)));
+                V_STORE_FMA(to, V_MUL(V_MUL(lit, cosine), V_SET(0.31830988618379067)), F(sigmoid)(raw));
                 dcosine = V_FMA(lit, kd, dcosine);
                 dirradiance = V_FMA(V_MUL(push, direct), surface, dirradiance);
                 ddirect = V_FMA(V_MUL(push, irradiance), surface, ddirect);
@@ -14390,7 +14244,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
                 const V push = V_MUL(V_LOAD(dspecular + c * SSDGS__BLOCK + s), V_SET(k->intensity[c])),
                         lobe_lit = V_MUL(V_MUL(push, irradiance), direct), shine = V_MUL(ks, gloss);
                 R *to = dgauss + (SSDGS_SPECULAR + c) * SSDGS__BLOCK + s;
-                V_STORE(to, V_FMA(V_MUL(lobe_lit, gloss), F(sigmoid)(raw), V_LOAD(to)));
+                V_STORE_FMA(to, V_MUL(lobe_lit, gloss), F(sigmoid)(raw));
                 dgloss = V_FMA(lobe_lit, ks, dgloss);
                 dirradiance = V_FMA(V_MUL(push, direct), shine, dirradiance);
                 ddirect = V_FMA(V_MUL(push, irradiance), shine, ddirect);
@@ -14403,7 +14257,7 @@ SSDGS__FN void F(colour_backward)(const ssdgs__lighting *k, const ssdgs__colour_
                 const V power = k->shadow_on_scattering ? V_MUL(g, factor) : g,
                         lamp = V_MUL(power, irradiance);
                 if (c == 0 || k->per_channel_optics) profile = F(dipole_of)(k, in->optics, c, s, unit, d);
-                V_STORE(to, V_FMA(V_MUL(lamp, profile), F(sigmoid)(raw), V_LOAD(to)));
+                V_STORE_FMA(to, V_MUL(lamp, profile), F(sigmoid)(raw));
                 dirradiance = V_FMA(power, V_MUL(kss, profile), dirradiance);
                 if (k->shadow_on_scattering)
                     dfactor = V_FMA(V_MUL(g, irradiance), V_MUL(kss, profile), dfactor);
@@ -14610,7 +14464,7 @@ SSDGS__FN void F(depth_normals)(const ssdgs_camera *camera, const R *depth, size
         n[1] = slope[1];
         n[2] = V_NEG(V_FMA(slope[0], ray,
                            V_FMA(slope[1], V_SET(((R)y + (R)0.5 - camera->cy) / camera->fy), V_SET(1))));
-        const V length = V_DIV(V_SET(-weight), V_SQRT(V_DOT3(n[0], n[1], n[2], n[0], n[1], n[2])));
+        const V length = V_DIV(V_SET(-weight), V_SQRT(V_DOT(n, n)));
         for (int i = 0; i < 3; i++)
             V_STORE(out + (size_t)i * stride + x,
                     V_SEL(known,
@@ -14685,6 +14539,7 @@ static const ssdgs__kernels F(kernels) = {SSDGS__KERNELS(SSDGS__KERNEL, SSDGS__T
 #undef SSDGS__TR
 #undef SSDGS__TV
 #undef SSDGS__TARGET
+#undef SSDGS__MM
 #undef R
 #undef V
 #undef VM
@@ -14715,11 +14570,11 @@ static const ssdgs__kernels F(kernels) = {SSDGS__KERNELS(SSDGS__KERNEL, SSDGS__T
 #undef V_UNROLL
 #undef V_ABS
 #undef V_DOT3
+#undef V_DOT
+#undef V_DOT_SET
+#undef V_STORE_ADD
+#undef V_STORE_FMA
 #undef F
-#undef SSDGS__FN
-#undef SSDGS__TRAINS
-#undef SSDGS__FI
-#undef SSDGS__NV
 #endif /* SSDGS__ISA */
 
 /*

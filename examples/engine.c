@@ -288,7 +288,8 @@ static ssdgs_result draw_frame(level *l, float t) {
     image.scene_depth = l->depth;
     ssdgs_result result = ssdgs_camera_from_matrices(l->context, l->view, l->projection, SSDGS_COLUMN_MAJOR,
                                                      l->width, l->height, &l->camera);
-    if (!result) result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, l->lights, LIGHTS, &options);
+    if (!result)
+        result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options);
     if (!result) draw_meshes(l);
     if (!result) result = shade_meshes(l);
     if (!result)

@@ -5,10 +5,12 @@
    #include "reduce.h"
    ...
    ssdgs_result result = reduce_model(context, &model, 5000);
+   if (!result) result = reduce_teach(original, model);
 
    HOW  Neighbours are merged, those first that are least missed, until so many are left. A merged Gaussian
-   has the mean of both, weighted by what is seen of each from around. No photographs are needed. With them
-   1,000 more iterations win back what was lost (examples/train.c, --refit).
+   has the mean of both, weighted by what is seen of each from around. No photographs are needed:
+   reduce_teach() trains what is left on pictures of the original. With photographs 1,000 more iterations win
+   back what was lost of them (examples/train.c, --refit).
 
    It takes a second for 30,000 Gaussians, so save the result. Its memory comes from malloc(). */
 
@@ -98,7 +100,7 @@ static inline ssdgs_result reduce__seen_around(const reduce__state *r) {
                          along[3] = {(ssdgs_real)(-across * cos(turn * view)),
                                      (ssdgs_real)(-across * sin(turn * view)), (ssdgs_real)-z};
         const ssdgs_light light = ssdgs_light_directional(along, even);
-        result = ssdgs_scene_light(scene, &object, 1, &light, 1, &exact);
+        result = ssdgs_scene_light(scene, &object, 1, NULL, &light, 1, &exact);
         for (size_t i = 0; i < r->rows && !result; i++) r->seen[i] += r->flux[i] / REDUCE__VIEWS;
     }
     ssdgs_scene_destroy(scene);
@@ -379,4 +381,99 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     free(r.raw), free(r.seen), free(r.flux), free(r.left), free(r.blob), free(r.pair);
     return result;
 }
+
+#ifndef SSDGS_NO_TRAINER
+#define REDUCE__PICTURES 150
+#define REDUCE__LESSONS 3000 /* iterations */
+
+/* Direction number i of an even spread over the sphere (Fibonacci's). */
+static inline void reduce__direction(int i, int many, double turn, double d[3]) {
+    const double z = 1 - 2 * (i + 0.5) / many, across = sqrt(1 - z * z), angle = turn + 2.39996322972865 * i;
+    d[0] = across * cos(angle);
+    d[1] = across * sin(angle);
+    d[2] = z;
+}
+
+/* Takes a picture of the original from direction number i, its pixels behind `pixels`, under a light from
+   elsewhere; as large as a level of so many Gaussians is drawn at most (ssdgs_object.levels). */
+static inline ssdgs_result reduce__picture(ssdgs_model *original, const ssdgs_real low[3],
+                                           const ssdgs_real high[3], int gaussians, int i, ssdgs_photo *photo,
+                                           float **pixels) {
+    double side[3];
+    for (int c = 0; c < 3; c++) side[c] = (double)high[c] - (double)low[c];
+    const double area = (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]) / 2;
+    const double radius = sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2]) / 2;
+    const double focal = 2.2 * radius * sqrt(gaussians * 8 / (3 * area)), across = 0.68 * focal;
+    const int width = across < 16 ? 16 : across < 512 ? (int)across : 512;
+    const size_t count = (size_t)width * (size_t)width;
+    double from[3], lit[3];
+    ssdgs_real eye[3], target[3], lamp[3], intensity[3];
+    const ssdgs_real up[3] = {0, 0, 1};
+    reduce__direction(i, REDUCE__PICTURES, 0, from);
+    reduce__direction(i * 61 % REDUCE__PICTURES, REDUCE__PICTURES, 1, lit);
+    for (int c = 0; c < 3; c++) {
+        const double middle = ((double)low[c] + (double)high[c]) / 2;
+        target[c] = (ssdgs_real)middle;
+        eye[c] = (ssdgs_real)(middle + 3.2 * radius * from[c]);
+        lamp[c] = (ssdgs_real)(middle + 3 * radius * lit[c]);
+        intensity[c] =
+            (ssdgs_real)(2 * 9 * radius * radius / (double)ssdgs_model_settings(original)->light_scale);
+    }
+    memset(photo, 0, sizeof *photo);
+    photo->camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.66, width, width);
+    photo->light = ssdgs_light_point(lamp, intensity);
+    photo->format = SSDGS_PIXELS_RGBA32F;
+    ssdgs_real *color = (ssdgs_real *)malloc(count * 4 * sizeof *color), *alpha = color + 3 * count;
+    photo->pixels = *pixels = (float *)malloc(count * 4 * sizeof **pixels);
+    ssdgs_result result = color && *pixels ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    ssdgs_image image;
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    image.alpha = alpha;
+    const ssdgs_render_options exact = ssdgs_render_options_exact();
+    if (!result) result = ssdgs_render_ex(original, &photo->camera, &photo->light, 1, &exact, &image, NULL);
+    for (size_t k = 0; k < 4 * count && !result; k++) {
+        const double cover = (double)alpha[k / 4];
+        (*pixels)[k] = (float)(k % 4 == 3     ? cover
+                               : cover > 1e-4 ? (double)color[k / 4 * 3 + k % 4] / cover
+                                              : 0);
+    }
+    free(color);
+    return result;
+}
+
+/* Teaches a level, which reduce_model() has made of its original, what that shows from all around, lit from
+   all around: half a minute for 2,500 Gaussians. Models that are not trained, baked ones and media, and
+   placed ones stay as they are. Where it fails the level may be half taught. */
+static inline ssdgs_result reduce_teach(ssdgs_model *original, ssdgs_model *level) {
+    const ssdgs_settings *s = ssdgs_model_settings(original);
+    ssdgs_photo photos[REDUCE__PICTURES];
+    float *pixels[REDUCE__PICTURES];
+    ssdgs_trainer *trainer = NULL;
+    memset(pixels, 0, sizeof pixels);
+    const ssdgs_settings unplaced = ssdgs_settings_default();
+    if (s->baked || s->kept > 0 || !s->scattering.layers || !ssdgs_model_peek(level).count ||
+        memcmp(&s->placement, &unplaced.placement, sizeof s->placement))
+        return SSDGS_OK;
+    ssdgs_train_options o = ssdgs_train_options_default();
+    o.iterations = REDUCE__LESSONS;
+    o.schedule = SSDGS_SCHEDULE_JOINT;
+    o.densify_until = o.opacity_reset_every = 0;
+    o.prune_outside = 0;
+    for (ssdgs_rate *rate = &o.rates.position; rate <= &o.rates.scattering; rate++) { /* fine steps */
+        rate->start *= (ssdgs_real)(rate == &o.rates.position ? 0.03 : 0.3);
+        rate->end *= (ssdgs_real)0.3;
+    }
+    ssdgs_result result = ssdgs_model_bounds(original, o.bounds_min, o.bounds_max);
+    for (int i = 0; i < REDUCE__PICTURES && !result; i++)
+        result = reduce__picture(original, o.bounds_min, o.bounds_max, ssdgs_model_peek(level).count, i,
+                                 photos + i, pixels + i);
+    if (!result) result = ssdgs_trainer_create(level, photos, REDUCE__PICTURES, &o, &trainer);
+    if (!result) result = ssdgs_trainer_run(trainer, NULL, NULL);
+    ssdgs_trainer_destroy(trainer);
+    for (int i = 0; i < REDUCE__PICTURES; i++) free(pixels[i]);
+    return result;
+}
+#endif
+
 #endif

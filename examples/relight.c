@@ -55,8 +55,8 @@ static const char *const help[] = {
     "                           room: 16 lights and ambient light; its rows lie round the upward axis",
     "  --ambient FACTOR         of the light from the room that the model's photographs had; 1, 0 leaves",
     "                           it out",
-    "  --reduce N               renders a level of detail: merges Gaussians until N are left, into",
-    "                           DIR/reduced.ply",
+    "  --reduce N               renders a level of detail, DIR/reduced.ply: merges Gaussians until N are",
+    "                           left, and teaches these what the model shows (half a minute)",
     "  --networks ORIGINAL.ply  settings and networks of the model before an editor of splats dropped",
     "                           them; with these, and where the editor put it, it goes to DIR/whole.ply",
     "  --threads N              0 = one per CPU (default); the result does not depend on it",
@@ -737,7 +737,12 @@ static int relight(job *j) {
     if (!check_outputs(j) || !make_planes(j)) return 1;
     if (j->given[NETWORKS] && !save_model(j, "whole.ply")) return 1;
     if (j->reduce) {
+        ssdgs_model *original = NULL;
+        if (ssdgs_model_load(j->context, j->model_path, &original, NULL))
+            return fail(ssdgs_error_message(j->context));
         result = reduce_model(j->context, &j->model, j->reduce);
+        if (!result) result = reduce_teach(original, j->model);
+        ssdgs_model_destroy(original);
         if (result) return fail(ssdgs_result_string(result));
         if (!save_model(j, "reduced.ply")) return 1;
     }

@@ -141,7 +141,7 @@ static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context
                                 ? ssdgs_light_point(u->options->eyes[u->batch + count], even)
                                 : ssdgs_light_directional(along, even);
         }
-        result = ssdgs_scene_light(scene, &object, 1, lights, count, &coarse);
+        result = ssdgs_scene_light(scene, &object, 1, NULL, lights, count, &coarse);
     }
     ssdgs_scene_destroy(scene);
     ssdgs_model_destroy(model);

@@ -297,7 +297,7 @@ static ssdgs_result place(ssdgs_model *model) {
         if (frame == 3) lights[0].intensity[0] = lights[0].intensity[1] = lights[0].intensity[2] = 0;
         if (frame == 3) scene_depth[PIXELS / 2] = 1;
         if (frame == 4) ssdgs_scene_occlude(scene, NULL);
-        if (frame != 1) result = ssdgs_scene_light(scene, objects, 3, lights, 7, &options);
+        if (frame != 1) result = ssdgs_scene_light(scene, objects, 3, NULL, lights, 7, &options);
         for (int i = 0; i < 30; i++) points[i] = (ssdgs_real)(0.15 * (i / 3) - 0.1 * (i % 3));
         for (int light = 0; light < 7 && !result; light++) {
             result = ssdgs_scene_shadow(scene, light, points, 10, fraction);

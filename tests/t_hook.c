@@ -209,7 +209,7 @@ static void take_shots(device *d, int mask, const ssdgs_settings *settings, shot
         ssdgs_image image = planes_of(&p);
         lamp.range = i < 2 ? (ssdgs_real)1.1 : 0;
         if (i == 1) objects[0].to_world[3] = (ssdgs_real)0.02;
-        CHECK(!ssdgs_scene_light(scene, objects, 2, &lamp, 1, &options));
+        CHECK(!ssdgs_scene_light(scene, objects, 2, NULL, &lamp, 1, &options));
         out->shadow[i % 2] = 1;
         CHECK(!ssdgs_scene_shadow(scene, 0, behind, 1, out->shadow + i % 2));
         CHECK(

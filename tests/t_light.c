@@ -121,7 +121,7 @@ static void test_unshadowed(ssdgs_model *model) {
     ssdgs_real fraction = 0;
     for (int unshadowed = 0; unshadowed < 2; unshadowed++) {
         lights[1].unshadowed = unshadowed;
-        CHECK(!ssdgs_scene_light(scene, &object, 1, lights, 2, NULL));
+        CHECK(!ssdgs_scene_light(scene, &object, 1, NULL, lights, 2, NULL));
         CHECK(!ssdgs_scene_shadow(scene, 1, behind, 1, &fraction));
         CHECK(unshadowed ? fraction >= 1 : fraction < (ssdgs_real)0.9);
     }

@@ -246,6 +246,42 @@ static void test_looks(void) {
     ssdgs_context_destroy(context);
 }
 
+/* Taught, a level shows what its original does, also where no lesson looked; what is not trained stays. */
+static void test_teach(void) {
+    static ssdgs_real whole[3 * PIXELS], merged[3 * PIXELS], taught[3 * PIXELS];
+    ssdgs_context *context = test_context(2);
+    ssdgs_model *original = striped(context, 600, 1, SSDGS_ALL_TERMS),
+                *level = striped(context, 600, 1, SSDGS_ALL_TERMS);
+    picture(original, whole);
+    CHECK(!reduce_model(context, &level, 60));
+    picture(level, merged);
+    CHECK(!reduce_teach(original, level) && ssdgs_model_peek(level).count == 60);
+    picture(level, taught);
+    const double before = error_of(whole, merged), after = error_of(whole, taught);
+    if (!CHECK(after < 0.5 * before)) printf("    %g merged, %g taught\n", before, after);
+    ssdgs_model_destroy(original);
+    ssdgs_model_destroy(level);
+    for (int kind = 0; kind < 3; kind++) {
+        ssdgs_settings s = ssdgs_settings_default();
+        s.baked = kind == 0;
+        if (kind == 1) s.placement.scale = 2;
+        if (kind == 2) s.scattering.layers = 0;
+        for (int c = 0; c < 3 && kind == 2; c++) s.medium.scattering[c] = 1;
+        original = new_model(context, &s, 20);
+        for (int i = 0; i < 20; i++) {
+            const ssdgs_gaussian g = any(i);
+            set(original, i, &g);
+        }
+        const ssdgs_model_view v = ssdgs_model_peek(original);
+        ssdgs_real was[20];
+        memcpy(was, v.gaussians + SSDGS_DIFFUSE * v.stride, sizeof was);
+        CHECK(!reduce_teach(original, original));
+        CHECK(!memcmp(was, v.gaussians + SSDGS_DIFFUSE * v.stride, sizeof was));
+        ssdgs_model_destroy(original);
+    }
+    ssdgs_context_destroy(context);
+}
+
 /* The same for any number of threads; what has fewer stays; nothing that is no number gets in. */
 static void test_edges(void) {
     ssdgs_context *contexts[2];
@@ -375,6 +411,7 @@ int main(void) {
     test_hidden(0);
     test_hidden(1);
     test_looks();
+    test_teach();
     test_edges();
     TEST_END();
 }

@@ -277,7 +277,7 @@ static const preset render_presets[] = {/* default, exact, fast, preview */
                                         R(max_error, 1.0 / 16, 0, 1.0 / 4, 1.0 / 2),
                                         R(light_detail, 1, 1, 0.7, 0.6),
                                         R(transport_detail, 0.6, 1, 0.6, 0.4),
-                                        R(level_detail, 1, 0, 0.7, 0.5)
+                                        R(level_detail, 1, 0, 0.5, 0.3)
 #undef I
 #undef R
 };

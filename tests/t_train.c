@@ -1628,9 +1628,11 @@ static void test_density(void) {
     memset(&correction, 0, sizeof correction);
     double gradient[9];
     for (int i = 0; i < 9; i++) gradient[i] = 0.5 * (i + 1);
-    for (int i = 0; i < 50; i++) ssdgs__correction_step(&correction, gradient, 0, 1e-3, 3, 0.1);
+    ssdgs_photo seen = photos[0]; /* 0.1 radians wide */
+    seen.camera.fx = (ssdgs_real)(0.5 * seen.camera.width / tan(0.05));
+    for (int i = 0; i < 50; i++) ssdgs__correction_step(&correction, &seen, gradient, 0, 1e-3, 3);
     const double before = correction.value[6];
-    ssdgs__correction_step(&correction, gradient, 1, 1e-3, 3, 0.1);
+    ssdgs__correction_step(&correction, &seen, gradient, 1, 1e-3, 3);
     CHECK(before == 0 && fabs(correction.value[6] + 3e-3) < 1e-6);
     CHECK(fabs(correction.value[0] + 0.15) < 3e-4 &&
           fabs(correction.value[3] + 0.005) < 1e-5); /* lengths, turns */

@@ -489,7 +489,7 @@ static void check_shadow(input *in, const picture *p) {
     ssdgs_real points[4 * 3], fraction[4];
     const int light = draw_below(in, MOST_LIGHTS + 1) - 1;
     for (int i = 0; i < 4 * 3; i++) points[i] = draw_real(in, i % 3 - 1, 2);
-    const int lit = done(context, ssdgs_scene_light(p->scene, p->objects, p->object_count, p->lights,
+    const int lit = done(context, ssdgs_scene_light(p->scene, p->objects, p->object_count, NULL, p->lights,
                                                     p->light_count, &p->options));
     if (!done(context, ssdgs_scene_shadow(p->scene, light, points, 4, fraction))) return;
     HOLDS(lit && light >= 0 && light < p->light_count);
