@@ -6,6 +6,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "olat.h"
+#include "reduce.h"
 #include "unbake.h"
 
 enum { OBJECTS = 3, LIGHTS = 3, TILES = 24, SHEET = 3, BALL = 2000 };
@@ -24,8 +25,8 @@ typedef struct level {
     float box_low[3], box_high[3];
     /* the library's */
     ssdgs_context *context;
-    ssdgs_model *models[2];
-    ssdgs_real low[2][3], high[2][3]; /* their bounds */
+    ssdgs_model *models[2], *coarse[2]; /* a third of the Gaussians, for when they are small */
+    ssdgs_real low[2][3], high[2][3];   /* their bounds */
     ssdgs_scene *scene;
     ssdgs_render_stats stats; /* of the last frame */
     float *color, *alpha;
@@ -245,6 +246,8 @@ static ssdgs_object place(const level *l, int model, float height, float x, floa
     const float rows[12] = {c, -d, 0, x, d, c, 0, y, 0, 0, s, -s * low[2]};
     const float middle[2] = {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2};
     ssdgs_object object = ssdgs_object_default(l->models[model]);
+    object.levels = &l->coarse[model];
+    object.level_count = 5 * ssdgs_model_count(l->coarse[model]) <= 4 * ssdgs_model_count(object.model);
     memcpy(object.to_world, rows, sizeof rows);
     for (int i = 0; i < 2; i++)
         object.to_world[4 * i + 3] -= rows[4 * i] * middle[0] + rows[4 * i + 1] * middle[1];
@@ -280,7 +283,8 @@ static ssdgs_result draw_frame(level *l, float t) {
     ssdgs_image image;
     ssdgs_render_options options = ssdgs_render_options_default();
     move(l, t);
-    options.antialias = 1; /* models are seen from farther away than their photographs */
+    options.level_detail = 1.5f; /* levels that were not taught show sooner */
+    options.antialias = 1;       /* models are seen from farther away than their photographs */
     for (int i = 0; i < 9; i++) options.ambient[i / 3][i % 3] = sky[i / 3][i % 3] / l->light_scale;
     memset(&image, 0, sizeof image);
     image.color = l->color;
@@ -318,24 +322,32 @@ static ssdgs_result open_context(int threads, ssdgs_context **out) {
 typedef struct load {
     const char *path; /* NULL: a ball */
     ssdgs_context *context;
-    ssdgs_model *model;
+    ssdgs_model *model, *coarse;
     ssdgs_result result;
 } load;
 
-/* A job of a loader thread. It has a context of its own, as one serves one thread at a time. */
+static ssdgs_result read_model(const load *job, int index, ssdgs_model **out) {
+    ssdgs_result result = job->path ? ssdgs_model_load(job->context, job->path, out, NULL)
+                                    : make_ball(job->context, index, out);
+    if (!result && ssdgs_model_settings(*out)->baked) { /* a plain splat: now it takes light */
+        ssdgs_model *plain = *out;
+        unbake_options options = unbake_options_default();
+        options.kept = 0.2f; /* and keeps some of its own */
+        result = unbake_model(job->context, plain, &options, out);
+        ssdgs_model_destroy(plain);
+    }
+    return result;
+}
+
+/* A job of a loader thread. It has a context of its own, as one serves one thread at a time. An engine would
+   have its levels of detail in files: build/relight --reduce teaches them, too. */
 static void load_model(void *loads, int index) {
     load *job = (load *)loads + index;
     job->result = open_context(1, &job->context);
+    if (!job->result) job->result = read_model(job, index, &job->model);
+    if (!job->result) job->result = read_model(job, index, &job->coarse);
     if (!job->result)
-        job->result = job->path ? ssdgs_model_load(job->context, job->path, &job->model, NULL)
-                                : make_ball(job->context, index, &job->model);
-    if (!job->result && ssdgs_model_settings(job->model)->baked) { /* a plain splat: now it takes light */
-        ssdgs_model *plain = job->model;
-        unbake_options options = unbake_options_default();
-        options.kept = 0.2f; /* and keeps some of its own */
-        job->result = unbake_model(job->context, plain, &options, &job->model);
-        ssdgs_model_destroy(plain);
-    }
+        job->result = reduce_model(job->context, &job->coarse, ssdgs_model_count(job->model) / 3 + 1);
 }
 
 static ssdgs_result open_level(level *l, const char *const models[2]) {
@@ -352,7 +364,9 @@ static ssdgs_result open_level(level *l, const char *const models[2]) {
     for (int i = 0; i < 2; i++) {
         ssdgs_result loaded = loads[i].result;
         l->models[i] = loads[i].model;
+        l->coarse[i] = loads[i].coarse;
         if (!loaded) loaded = ssdgs_model_move(l->models[i], l->context);
+        if (!loaded) loaded = ssdgs_model_move(l->coarse[i], l->context);
         if (!loaded) loaded = ssdgs_model_bounds(l->models[i], l->low[i], l->high[i]);
         if (!loaded) printf("model %d: %d Gaussians\n", i, ssdgs_model_count(l->models[i]));
         if (!result) result = loaded;
@@ -436,7 +450,7 @@ int main(int argc, char **argv) {
     ssdgs_context_trim(l.context); /* as when a menu hides the level: its next frame takes the memory anew */
     if (!result && !failed) failed = write_png(out, "sheet.png", SHEET * l.width, SHEET * l.height, sheet);
     ssdgs_scene_destroy(l.scene);
-    for (int i = 0; i < 2; i++) ssdgs_model_destroy(l.models[i]);
+    for (int i = 0; i < 2; i++) ssdgs_model_destroy(l.models[i]), ssdgs_model_destroy(l.coarse[i]);
     ssdgs_context_destroy(l.context);
     free(planes), free(sheet), free(l.pixels);
     return result || failed;
