@@ -9476,9 +9476,9 @@ struct ssdgs_trainer {
     size_t stride;             /* of the planes below: the model's capacity */
     ssdgs_real *mean, *square; /* (SSDGS_CHANNELS, stride) Adam's moments */
     ssdgs_real *global_mean, *global_square;
-    ssdgs_real *screen_gradient; /* (n) each, sums since the last density control: pull, views, weights */
+    ssdgs_real *screen_gradient; /* (n) each, sums since the last density control: pull, views, worth */
     ssdgs_real *screen_count;
-    ssdgs_real *contribution;
+    ssdgs_real *worth;     /* |dL/d(ln opacity)|: what the loss would change without it, to first order */
     ssdgs_real *sky_share; /* (2 x stride) what of settings.ambient comes to each Gaussian, and scratch */
     double extent;         /* 1.1 x the cameras' radius or the bounds' longest side, whichever is more */
     int budget;            /* density control ends with no more Gaussians */
@@ -10168,7 +10168,7 @@ static void ssdgs__anchor_cameras(ssdgs_trainer *trainer) {
 
 /* ==== >>density  clone, split, prune: the number of Gaussians ==== */
 
-/* Reads gradients and weights gathered over the photographs. Adds and removes Gaussians. Called by steps. */
+/* Reads gradients gathered over the photographs. Adds and removes Gaussians. Called by steps. */
 
 #define SSDGS__STATISTICS 3
 #define SSDGS__FULL 0.36       /* of densify_until: so long there may be options.surplus times as many */
@@ -10218,7 +10218,7 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
     ssdgs__release(context, trainer->screen_gradient);
     trainer->screen_gradient = statistics;
     trainer->screen_count = statistics + capacity;
-    trainer->contribution = statistics + 2 * capacity;
+    trainer->worth = statistics + 2 * capacity;
     trainer->sky_share = statistics + SSDGS__STATISTICS * capacity;
     trainer->run.sky_ready = 0;
     if (capacity != model->capacity) model->arrangement++;
@@ -10392,7 +10392,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         log(0.1 * trainer->extent > 2 * trainer->run.start_size ? 0.1 * trainer->extent
                                                                 : 2 * trainer->run.start_size);
     const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
-    /* opacities were reset since the last control: weights say little */
+    /* opacities were reset since the last control: worths say little */
     const int before = trainer->run.iteration - o->batch, last = ssdgs__last_reset(o, before);
     const int recovering = last && last > before - o->densify_every;
     uint64_t *order;
@@ -10426,7 +10426,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     qsort(candidates, wanted, sizeof *candidates, ssdgs__ranked_compare);
     size_t room = allowed > n - dropped ? allowed - (n - dropped) : 0;
     if (wanted > room || n - dropped > allowed) {
-        /* over the cap the least contributing go at once; up to it they make room for new ones, a twentieth
+        /* over the cap those of least worth go at once; up to it they make room for new ones, a twentieth
            at a time */
         ssdgs__ranked *least = candidates + n;
         const size_t over = n - dropped > allowed ? n - dropped - allowed : 0;
@@ -10435,7 +10435,7 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
         for (size_t i = 0; i < n; i++)
             if (!drop[i]) { /* those of photographs that were not drawn: last */
                 const ssdgs_real seen = trainer->screen_count[i];
-                least[m].value = seen > 0 ? -trainer->contribution[i] / seen : (ssdgs_real)-1e30;
+                least[m].value = seen > 0 ? -trainer->worth[i] / seen : (ssdgs_real)-1e30;
                 least[m++].index = (uint32_t)i;
             }
         qsort(least, m, sizeof *least, ssdgs__ranked_compare);
@@ -10481,7 +10481,7 @@ static void ssdgs__gather_statistics(const ssdgs_trainer *trainer, const ssdgs_f
         const ssdgs_real *d = frame->splat_gradient + SSDGS__SPLAT * g, x = d[0] * half_w, y = d[1] * half_h;
         sums[g] += SSDGS__SQRT(x * x + y * y);
         sums[trainer->stride + g] += 1;
-        sums[2 * trainer->stride + g] += d[6];
+        sums[2 * trainer->stride + g] += d[5] < 0 ? -d[5] : d[5];
     }
 }
 
