@@ -620,7 +620,7 @@ SSDGS_API void ssdgs_scene_destroy(ssdgs_scene *scene); /* NULL is fine */
    other. Light scatters within each alone. A model that is scaled stays as bright. objects may be NULL when
    object_count is 0. ERR_ARGUMENT: a transform is none of the above, a tint is negative, or the models mix
    settings.transfer (baked ones may). ERR_NONFINITE: a transform or a background is not finite. ERR_LIMIT:
-   2^28 Gaussians in all, 65,535 objects. */
+   2^28 Gaussians in all, 65,535 objects; those with levels count twice. */
 SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object *objects, int object_count,
                                           const ssdgs_camera *camera, const ssdgs_light *lights,
                                           int light_count, const ssdgs_render_options *options,
@@ -755,8 +755,8 @@ typedef struct ssdgs_train_options {
     ssdgs_real bounds_min[3];    /* world: the box that holds the object alone; -0.5 */
     ssdgs_real bounds_max[3];    /* 0.5 */
     ssdgs_real densify_gradient; /* half images: a Gaussian pulled as hard is cloned or split; 0: all; 4e-4 */
-    ssdgs_real surplus; /* 1 and up: density control makes so many times max_gaussians at first. From 18000*
-                           to 36000* those go that give least to the photographs; 2 */
+    ssdgs_real surplus; /* 1 and up: density control makes so many times max_gaussians at first. From 0.36 to
+                           0.72 of densify_until those go that the loss would miss least; 2 */
     /* A Gaussian is removed if more than this share of the photographs that see its centre show background
        there, or if none sees it; 0.02. Photographs should be transparent where the object is not. One has an
        outline if more than 1 % of its pixels, but not all, have alpha 0. Of eight outlines or more those that
@@ -3570,6 +3570,7 @@ static double ssdgs__scale2(const ssdgs_real m[12]) {
 
 static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_object *objects, int count) {
     int64_t gaussians = 0;
+    int drawn = 0;
     const ssdgs_model *first = NULL;
     SSDGS__REFUSE(count < 0 || (count && !objects),
                   count < 0 ? "%d objects" : "%d objects, but the array is NULL", count);
@@ -3622,9 +3623,11 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
                           "object %d: its settings.transfer is not that of the objects before it", i);
             first = o->model;
         }
-        gaussians += (o->model->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
+        for (int j = 0; j < 1 + (o->level_count > 0); j++, drawn++) /* two may fade into each other */
+            gaussians +=
+                ((j ? o->levels[0] : o->model)->count + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
     }
-    if (count > (int)UINT16_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects", count);
+    if (drawn > (int)UINT16_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of %d objects", count);
     if (gaussians > SSDGS__MAX_GAUSSIANS)
         return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a scene of more than %d Gaussians",
                            SSDGS__MAX_GAUSSIANS);
@@ -7653,8 +7656,7 @@ static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, const ssdgs_camera 
         ssdgs_object *o = chosen + count++;
         *o = request->objects[i];
         if (!o->level_count || o->mask) continue;
-        const ssdgs_result result = ssdgs__model_box(o->model);
-        if (result) return result;
+        SSDGS__TRY(ssdgs__model_box(o->model));
         const double needed = ssdgs__needed(o, camera, detail);
         for (int j = 0; j < o->level_count; j++) {
             const double share =

@@ -811,6 +811,15 @@ static void test_levels(void) {
     wrong[2] = cloud(&s, 0, 10, 0.5);
     refused(&object, 1, "object 0: level 0 is not of its model's context, transfer or kind");
     ssdgs_model_destroy(wrong[2]);
+    const int many = 32768; /* twice as many are one too many */
+    ssdgs_object *objects = (ssdgs_object *)malloc((size_t)many * sizeof *objects);
+    for (int i = 0; i < many; i++) {
+        objects[i] = ssdgs_object_default(models[1]);
+        objects[i].levels = models + 2;
+        objects[i].level_count = 1;
+    }
+    refused(objects, many, "a scene of 32768 objects");
+    free(objects);
     for (int i = 0; i < 3; i++) ssdgs_model_destroy(models[i]);
 }
 
