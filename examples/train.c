@@ -81,9 +81,8 @@ static const char *const help[] = {
     "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again",
     "  --points N               random points at the start, of which those outside of the outlines go;",
     "                           10000",
-    "  --max-gaussians N        at most so many Gaussians in the end, until then up to twice as many; three",
-    "                           eighths of the pixels that a photograph shows (published: 100000, never "
-    "more)",
+    "  --max-gaussians N        at most so many Gaussians in the end, twice as many before; three eighths of",
+    "                           the pixels that a photograph shows (published: 100000 at any time)",
     "  --train-json FILE        another list of frames in DATASET; transforms_train.json",
     "  --seed N                 of the random numbers; 1",
     "  --threads N              0 = one per CPU (default); the result does not depend on it",
