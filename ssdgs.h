@@ -141,8 +141,8 @@ SCENES, as engines have them: examples/engine.c is one
 SPEED
   ssdgs_render_options_exact() is the method as written. _default() loses less than 0.02 dB against
   photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with
-  the number of Gaussians: examples/reduce.h makes levels of detail, build/train --refit teaches them what the
-  model shows, and of ssdgs_object.levels a frame draws what pixels ask for.
+  the number of Gaussians: examples/reduce.h makes levels of detail and teaches them what the model shows. Of
+  ssdgs_object.levels a frame draws what its pixels ask for.
   Skipped without changing any bit: Gaussians that no pixel blends, neurons that are 0 in a whole block of 64
   Gaussians, terms not asked for, results of the last frame that still hold.
 
@@ -539,7 +539,7 @@ typedef struct ssdgs_render_options {
     ssdgs_real max_error;    /* 0 .. 1: Gaussians whose weights sum to less in every pixel are not shaded */
     ssdgs_real light_detail; /* 0.01 .. 8: resolution of the light maps; 1 = the model's choice */
     ssdgs_real transport_detail; /* 0.1 .. 8: accuracy of true dipole transport; 1 = 1 % off at most, about */
-    ssdgs_real level_detail;     /* 0 .. 8: of an object with levels, see ssdgs_object; 0: its model itself */
+    ssdgs_real level_detail;     /* 0 .. 8: how fine ssdgs_object.levels are to be; 0: the model itself */
     ssdgs_real ambient[9][3];    /* RGB, light from all around: see below; 0 = none */
 } ssdgs_render_options;
 /* ambient: the irradiance on a surface with the world's normal x y z is the sum of ambient[0] .. [8] times 1,
@@ -601,11 +601,11 @@ typedef struct ssdgs_object {
                                    stays as it is. Geometric lobes take roughness whole. Read in the call.
                                    NULL: all do; NULL */
     ssdgs_real presence;        /* 0 .. 1: share of its optical depth that is there: fades it in and out; 1 */
-    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, each of four fifths
-                                   of those before or less. A frame draws the least one that has 3 for 8
-                                   pixels of the object's box, times options.level_detail; where it has up to
-                                   a tenth more, two that fade into each other. An object with a mask stays as
-                                   it is. Read in the call; NULL */
+    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, each time of four
+                                   fifths at most. A frame draws the smallest that has 3 Gaussians for 8 pixels
+                                   of the object's box, times options.level_detail. Where it has less than a
+                                   tenth more than that, it and the one before fade into each other. An object
+                                   with a mask stays as it is. Read in the call; NULL */
     int level_count;
 } ssdgs_object;
 /* A model as it was trained, where its settings.placement puts it. */
