@@ -602,10 +602,10 @@ typedef struct ssdgs_object {
                                    NULL: all do; NULL */
     ssdgs_real presence;        /* 0 .. 1: share of its optical depth that is there: fades it in and out; 1 */
     ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, each time of four
-                                   fifths at most. A frame draws the smallest that has 3 Gaussians for 8 pixels
-                                   of the object's box, times options.level_detail. Where it has less than a
-                                   tenth more than that, it and the one before fade into each other. An object
-                                   with a mask stays as it is. Read in the call; NULL */
+                                   fifths at most. A frame draws the smallest that has 3 Gaussians for 8
+                                   pixels of the object's box, times options.level_detail. Where it has less
+                                   than a tenth more than that, it and the one before fade into each other. An
+                                   object with a mask stays as it is. Read in the call; NULL */
     int level_count;
 } ssdgs_object;
 /* A model as it was trained, where its settings.placement puts it. */
