@@ -947,17 +947,19 @@ static void measure_scaling(bench *b) {
 /* Placed objects of one model of 5,000 Gaussians on a square grid, under point lights that hang over it: a
    frame in which the lights, the camera and an object move, and one in which nothing does. */
 static void measure_scenes(bench *b) {
-    enum { EVERYWHERE, LOCAL, AMBIENT };
-    static const char *const reach[3] = {"", " with a range", ", ambient"};
+    enum { EVERYWHERE, LOCAL, AMBIENT, BY_LEVELS };
+    static const char *const reach[4] = {"", " with a range", ", ambient", " with a range, levels of detail"};
     static const int kinds[][3] = {{1, 1, EVERYWHERE}, {3, 2, EVERYWHERE},  {10, 1, EVERYWHERE},
                                    {10, 1, AMBIENT},   {10, 4, EVERYWHERE}, {100, 1, EVERYWHERE},
-                                   {100, 16, LOCAL}}; /* objects, lights */
-    enum { KINDS = sizeof kinds / sizeof *kinds, MOST = 100, COUNT = 5000, LIGHTS = 16 };
+                                   {100, 16, LOCAL},   {100, 16, BY_LEVELS}}; /* objects, lights */
+    enum { KINDS = sizeof kinds / sizeof *kinds, MOST = 100, COUNT = 5000, LIGHTS = 16, COARSER = 3 };
     const ssdgs_real *intensity = b->photos[0].light.intensity;
     table *t = new_table(b, "scenes", "objects lights gaussians ms_moving ms_at_rest mib_held");
-    for (int k = 0; k < KINDS - 2 * b->quick; k++) {
+    for (int k = 0; k < KINDS - 3 * b->quick; k++) {
         const int objects = kinds[k][0], lights = kinds[k][1], side = (int)ceil(sqrt(objects));
-        const int local = kinds[k][2] == LOCAL, rows = local ? 4 : 2;
+        const int levels = kinds[k][2] == BY_LEVELS, local = levels || kinds[k][2] == LOCAL,
+                  rows = local ? 4 : 2;
+        ssdgs_model *coarser[COARSER] = {NULL, NULL, NULL};
         ssdgs_render_options options = ssdgs_render_options_default();
         static ssdgs_object object[MOST];
         ssdgs_light light[LIGHTS];
@@ -970,12 +972,18 @@ static void measure_scenes(bench *b) {
         open_metered(b, &s, &m, 0);
         reduce_session(&s, COUNT / (double)s.model->count);
         check(s.context, ssdgs_model_bounds(s.model, low, high));
+        for (int i = 0; i < COARSER && levels; i++) { /* a half, a quarter, an eighth, merged */
+            check(s.context, ssdgs_model_load(s.context, b->model, &coarser[i], NULL));
+            check(s.context, reduce_model(s.context, &coarser[i], s.model->count >> (i + 1)));
+        }
         check(s.context, ssdgs_scene_create(s.context, &scene));
         const ssdgs_real step =
             (ssdgs_real)1.1 * (high[0] - low[0] > high[1] - low[1] ? high[0] - low[0] : high[1] - low[1]);
         const ssdgs_real width = step * (ssdgs_real)side, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         for (int i = 0; i < objects; i++) {
             object[i] = ssdgs_object_default(s.model);
+            object[i].levels = coarser;
+            object[i].level_count = levels ? COARSER : 0;
             object[i].to_world[3] = step * ((ssdgs_real)(i % side) - (ssdgs_real)(side - 1) / 2);
             object[i].to_world[7] = step * ((ssdgs_real)(i / side) - (ssdgs_real)(side - 1) / 2);
         }
@@ -1008,6 +1016,7 @@ static void measure_scenes(bench *b) {
         add_row(t, name, (double)objects, (double)lights, (double)objects * s.model->count, best[0], best[1],
                 (double)m.peak / 1048576);
         ssdgs_scene_destroy(scene);
+        for (int i = 0; i < COARSER; i++) ssdgs_model_destroy(coarser[i]);
         close_session(&s);
     }
     print_table(t);

@@ -147,7 +147,7 @@ static void call_everything(void) {
     REFUSED(ssdgs_refine_photo, model, &copy, photo.light.intensity, 1);
     REFUSED(ssdgs_scene_create, context, &stage);
     REFUSED(ssdgs_scene_render, scene, &object, 1, &photo.camera, &photo.light, 1, NULL, &image, NULL);
-    REFUSED(ssdgs_scene_light, scene, &object, 1, &photo.light, 1, NULL);
+    REFUSED(ssdgs_scene_light, scene, &object, 1, &photo.camera, &photo.light, 1, NULL);
     REFUSED(ssdgs_scene_shadow, scene, 0, gaussian.position, 1, low);
     IGNORED(ssdgs_scene_occlude, scene, NULL);
     REFUSED(ssdgs_trainer_create, model, &photo, 1, NULL, &next);
