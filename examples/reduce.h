@@ -423,22 +423,22 @@ static inline ssdgs_result reduce__picture(ssdgs_model *original, const ssdgs_re
     photo->camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.66, width, width);
     photo->light = ssdgs_light_point(lamp, intensity);
     photo->format = SSDGS_PIXELS_RGBA32F;
-    ssdgs_real *color = (ssdgs_real *)malloc(count * 4 * sizeof *color), *alpha = color + 3 * count;
-    photo->pixels = *pixels = (float *)malloc(count * 4 * sizeof **pixels);
-    ssdgs_result result = color && *pixels ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    const ssdgs_render_options exact = ssdgs_render_options_exact();
     ssdgs_image image;
     memset(&image, 0, sizeof image);
-    image.color = color;
-    image.alpha = alpha;
-    const ssdgs_render_options exact = ssdgs_render_options_exact();
+    image.color = (ssdgs_real *)malloc(count * 3 * sizeof *image.color);
+    image.alpha = (ssdgs_real *)malloc(count * sizeof *image.alpha);
+    photo->pixels = *pixels = (float *)malloc(count * 4 * sizeof **pixels);
+    ssdgs_result result = image.color && image.alpha && *pixels ? SSDGS_OK : SSDGS_ERR_MEMORY;
     if (!result) result = ssdgs_render_ex(original, &photo->camera, &photo->light, 1, &exact, &image, NULL);
     for (size_t k = 0; k < 4 * count && !result; k++) {
-        const double cover = (double)alpha[k / 4];
+        const double cover = (double)image.alpha[k / 4];
         (*pixels)[k] = (float)(k % 4 == 3     ? cover
-                               : cover > 1e-4 ? (double)color[k / 4 * 3 + k % 4] / cover
+                               : cover > 1e-4 ? (double)image.color[k / 4 * 3 + k % 4] / cover
                                               : 0);
     }
-    free(color);
+    free(image.color);
+    free(image.alpha);
     return result;
 }
 
