@@ -601,11 +601,11 @@ typedef struct ssdgs_object {
                                    stays as it is. Geometric lobes take roughness whole. Read in the call.
                                    NULL: all do; NULL */
     ssdgs_real presence;        /* 0 .. 1: share of its optical depth that is there: fades it in and out; 1 */
-    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer Gaussians, each time of four
-                                   fifths at most. A frame draws the smallest that has 3 Gaussians for 8
-                                   pixels of the object's box, times options.level_detail. Where it has less
-                                   than a tenth more than that, it and the one before fade into each other. An
-                                   object with a mask stays as it is. Read in the call; NULL */
+    ssdgs_model *const *levels; /* (level_count) the same thing made of fewer and fewer Gaussians: each has at
+                                   most four fifths of those before. A frame draws the smallest that has 3
+                                   Gaussians for 8 pixels of the object's box, times options.level_detail. Up
+                                   to a tenth more, it and the one before fade into each other. An object with
+                                   a mask stays as it is. Read in the call; NULL */
     int level_count;
 } ssdgs_object;
 /* A model as it was trained, where its settings.placement puts it. */
@@ -740,8 +740,8 @@ typedef struct ssdgs_train_options {
                               1 */
     int initial_points;    /* random Gaussians in the bounds when the model is empty, no more than density
                               control makes; 10000 */
-    int max_gaussians;     /* density control ends with no more; 0: than three eighths of the pixels that a
-                              photograph shows, on average, but 1,000 to 50,000; 0 */
+    int max_gaussians;     /* density control ends with so many at most; 0: three eighths of the pixels that
+                              a photograph shows, on average, but 1,000 to 50,000; 0 */
     int densify_every;     /* 1 and up: iterations between two rounds of density control; 100 */
     int densify_from;      /* first round; 200 */
     int densify_until;     /* last round; 50000* */
@@ -1019,7 +1019,7 @@ typedef struct ssdgs_placed {
     int light_count;                          /* the frame's; 0 where no light changes it */
     int turned;                               /* 0: rotation is the identity */
     ssdgs_real rotation[9], scale, offset[3]; /* point p -> scale rotation p + offset; it may mirror */
-    uint64_t key;             /* of revision, first, rotation, scale and offset: equal where these are */
+    uint64_t key; /* of revision, first, rotation, scale, offset, presence: equal where these are */
     double middle[3], radius; /* world: a ball around what it draws; no use with one object alone */
     ssdgs_real tint[3], roughness, specular, translucency, kept, presence;
     ssdgs_real medium[15];       /* RGB weights of true transport's lengths, where a medium scatters */
@@ -3372,6 +3372,14 @@ static void ssdgs__look_along(const double eye[3], const double forward[3], cons
     view[11] = (ssdgs_real) - (f[0] * eye[0] + f[1] * eye[1] + f[2] * eye[2]);
 }
 
+static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
+    for (int j = 0; j < 3; j++) {
+        centre[j] = 0;
+        for (int l = 0; l < 3; l++)
+            centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
+    }
+}
+
 SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs_real target[3],
                                             const ssdgs_real up[3], ssdgs_real fov_x, int width, int height) {
     ssdgs_camera camera;
@@ -3606,14 +3614,18 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
                       "ssdgs_object_default() sets them",
                       i, (double)o->roughness, (double)o->specular, (double)o->translucency, (double)o->kept,
                       (double)o->presence);
-        SSDGS__REFUSE(o->level_count < 0 || (o->level_count && !o->levels), "object %d: %d levels at %s", i,
-                      o->level_count, o->levels ? "an array" : "NULL");
+        SSDGS__REFUSE(o->level_count < 0 || (o->level_count && !o->levels),
+                      o->level_count < 0 ? "object %d: %d levels"
+                                         : "object %d: %d levels, but the array is NULL",
+                      i, o->level_count);
         for (int j = 0; j < o->level_count; j++) {
             const ssdgs_model *level = o->levels[j], *before = j ? o->levels[j - 1] : o->model;
-            SSDGS__REFUSE(!level || level->context != context ||
-                              level->settings.transfer != o->model->settings.transfer ||
-                              level->settings.baked != o->model->settings.baked,
-                          "object %d: level %d is not of its model's context, transfer or kind", i, j);
+            SSDGS__REFUSE(
+                !level || level->context != context ||
+                    level->settings.transfer != o->model->settings.transfer ||
+                    level->settings.baked != o->model->settings.baked,
+                "object %d: level %d is NULL or has another context, settings.transfer or settings.baked", i,
+                j);
             SSDGS__REFUSE(5 * (int64_t)level->count > 4 * (int64_t)before->count,
                           "object %d: level %d has %d Gaussians, over four fifths of the %d before it", i, j,
                           level->count, before->count);
@@ -3971,7 +3983,7 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
 
 /* Presets and their checks, and what settings and options ask of a frame. */
 
-#define SSDGS__PER_PIXEL 0.375 /* more Gaussians than that take time and show nothing */
+#define SSDGS__PER_PIXEL 0.375 /* Gaussians: more take time and show little */
 
 /* clang-format off */
 #define SSDGS__O(member, type, low, high, exact, standard, fast, preview) \
@@ -4278,7 +4290,7 @@ static ssdgs_result ssdgs__place_all(ssdgs_frame *frame, const ssdgs_object *obj
         ssdgs_placed o, *last = frame->objects + i;
         ssdgs__place(objects + i, &o);
         const int known = last->revision == o.revision; /* that of no model is 0 */
-        SSDGS__TRY(known ? SSDGS_OK : ssdgs__globals_check(o.model));
+        if (!known) SSDGS__TRY(ssdgs__globals_check(o.model));
         if (known && !memcmp(&last->translucency, &o.translucency, sizeof o.translucency))
             memcpy(o.medium, last->medium, sizeof o.medium);
         else if (ssdgs__has_medium(&o.settings, o.settings.terms))
@@ -4440,7 +4452,7 @@ static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame) {
         ssdgs_placed *o = frame->objects + i;
         const ssdgs_model *model = o->model;
         double half2 = 0;
-        SSDGS__TRY(several ? ssdgs__model_box(o->model) : SSDGS_OK);
+        if (several) SSDGS__TRY(ssdgs__model_box(o->model));
         for (int c = 0; c < 3; c++) {
             const double half = (model->high[c] - model->low[c]) / 2;
             half2 += half * half;
@@ -7623,25 +7635,28 @@ static ssdgs_result ssdgs__scene_leave(ssdgs_scene *scene, ssdgs_result result) 
 }
 
 /* The Gaussians that an object needs: so many for each pixel of its box, whose shadow's mean area is a
-   quarter of its surface (Cauchy). */
+   quarter of its surface (Cauchy). By distance, not depth: the same wherever the camera looks. */
 static double ssdgs__needed(const ssdgs_object *o, const ssdgs_camera *camera, double detail) {
     const ssdgs__bounds *b = &o->model->bounds;
     const double side[3] = {b->high[0] - b->low[0], b->high[1] - b->low[1], b->high[2] - b->low[2]};
     const double area = (side[0] * side[1] + side[1] * side[2] + side[2] * side[0]) / 2;
-    const double half = sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2]) / 2;
+    const double half2 = (side[0] * side[0] + side[1] * side[1] + side[2] * side[2]) / 4;
     const double scale2 = ssdgs__scale2(o->to_world);
-    double z = (double)camera->view[11] - half * sqrt(scale2); /* of what may be nearest */
+    double eye[3], distance2 = 0;
+    ssdgs__camera_centre(camera, eye);
     for (int i = 0; i < 3; i++) {
-        double at = (double)o->to_world[4 * i + 3];
+        double at = (double)o->to_world[4 * i + 3] - eye[i];
         for (int j = 0; j < 3; j++) at += (double)o->to_world[4 * i + j] * (b->low[j] + b->high[j]) / 2;
-        z += (double)camera->view[8 + i] * at;
+        distance2 += at * at;
     }
+    const double z = sqrt(distance2) - sqrt(half2 * scale2); /* of what may be nearest */
     return z > 0
                ? detail * SSDGS__PER_PIXEL * area * scale2 * (double)camera->fx * (double)camera->fy / (z * z)
                : 1e30;
 }
 
-/* Objects with the levels that their sizes in the picture ask for. Only they decide: nothing pops. */
+/* Puts in the place of objects the levels that their sizes in the picture ask for. Nothing else decides, so
+   nothing pops. */
 static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, const ssdgs_camera *camera,
                                          ssdgs__request *request) {
     ssdgs_context *context = scene->context;
@@ -7660,7 +7675,7 @@ static ssdgs_result ssdgs__choose_levels(ssdgs_scene *scene, const ssdgs_camera 
         const double needed = ssdgs__needed(o, camera, detail);
         for (int j = 0; j < o->level_count; j++) {
             const double share =
-                10 * (o->levels[j]->count / needed - 1); /* of the level, not of what is before */
+                10 * (o->levels[j]->count / needed - 1); /* the level's; the one before has the rest */
             if (!(share > 0)) break;
             if (share < 1) {
                 chosen[count] = *o;
@@ -7712,12 +7727,11 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
                                          int light_count, const ssdgs_render_options *options) {
     ssdgs_frame frame;
     SSDGS__BEGIN(scene, scene->context, "ssdgs_scene_light");
-    ssdgs_result result = SSDGS_OK;
+    ssdgs_result result = ssdgs__objects_check(scene->context, objects, object_count);
     ssdgs__request request = ssdgs__request_of(objects, object_count, NULL, lights, light_count, options);
     request.maps = scene->maps = 1;
     request.mirrored = 1;
     request.occluder = &scene->occluder;
-    result = ssdgs__objects_check(scene->context, objects, object_count);
     if (!result) result = ssdgs__choose_levels(scene, camera, &request);
     if (!result) result = ssdgs__frame_begin(&frame, scene->context, &scene->frame, &request);
     if (!result) result = ssdgs__run_stages(&frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_WALK);
@@ -10700,14 +10714,6 @@ SSDGS_API void ssdgs_trainer_destroy(ssdgs_trainer *trainer) {
         ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                     "ssdgs_trainer_destroy: the trainer runs, its progress callback must not destroy it");
     ssdgs__leave_and_drop(context);
-}
-
-static void ssdgs__camera_centre(const ssdgs_camera *camera, double centre[3]) {
-    for (int j = 0; j < 3; j++) {
-        centre[j] = 0;
-        for (int l = 0; l < 3; l++)
-            centre[j] -= (double)camera->view[4 * l + j] * (double)camera->view[4 * l + 3];
-    }
 }
 
 /* Whether a photograph, of several the one with an index, else -1, can be rendered and compared on a

@@ -25,7 +25,7 @@ typedef struct level {
     float box_low[3], box_high[3];
     /* the library's */
     ssdgs_context *context;
-    ssdgs_model *models[2], *coarse[2]; /* a third of the Gaussians, for when they are small */
+    ssdgs_model *models[2], *coarse[2]; /* coarse: of a third of the Gaussians, for small pictures of them */
     ssdgs_real low[2][3], high[2][3];   /* their bounds */
     ssdgs_scene *scene;
     ssdgs_render_stats stats; /* of the last frame */

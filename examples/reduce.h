@@ -86,6 +86,14 @@ static inline ssdgs_result reduce__level(const reduce__state *r, ssdgs_model **l
     return SSDGS_OK;
 }
 
+/* Direction number i of so many on a spiral around the sphere, which begins at an angle. */
+static inline void reduce__direction(int i, int many, double angle, double d[3]) {
+    const double z = 1 - (2 * i + 1.0) / many, across = sqrt(1 - z * z), turn = 2.39996323;
+    d[0] = across * cos(angle + turn * i);
+    d[1] = across * sin(angle + turn * i);
+    d[2] = z;
+}
+
 /* How much of each Gaussian is seen from around: what parallel lights shed on it, on average. */
 static inline ssdgs_result reduce__seen_around(const reduce__state *r) {
     ssdgs_model *level = NULL;
@@ -94,11 +102,11 @@ static inline ssdgs_result reduce__seen_around(const reduce__state *r) {
     ssdgs_result result = reduce__level(r, &level);
     if (!result) result = ssdgs_scene_create(r->context, &scene);
     const ssdgs_object object = ssdgs_object_default(level);
-    for (int view = 0; view < REDUCE__VIEWS && !result; view++) { /* on a spiral around the sphere */
-        const double z = 1 - (2 * view + 1.0) / REDUCE__VIEWS, across = sqrt(1 - z * z), turn = 2.39996323;
+    for (int view = 0; view < REDUCE__VIEWS && !result; view++) {
+        double d[3];
+        reduce__direction(view, REDUCE__VIEWS, 0, d);
         const ssdgs_real even[3] = {1, 1, 1},
-                         along[3] = {(ssdgs_real)(-across * cos(turn * view)),
-                                     (ssdgs_real)(-across * sin(turn * view)), (ssdgs_real)-z};
+                         along[3] = {(ssdgs_real)-d[0], (ssdgs_real)-d[1], (ssdgs_real)-d[2]};
         const ssdgs_light light = ssdgs_light_directional(along, even);
         result = ssdgs_scene_light(scene, &object, 1, NULL, &light, 1, &exact);
         for (size_t i = 0; i < r->rows && !result; i++) r->seen[i] += r->flux[i] / REDUCE__VIEWS;
@@ -386,14 +394,6 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
 #define REDUCE__PICTURES 150
 #define REDUCE__LESSONS 3000 /* iterations */
 
-/* Direction number i of an even spread over the sphere (Fibonacci's). */
-static inline void reduce__direction(int i, int many, double turn, double d[3]) {
-    const double z = 1 - 2 * (i + 0.5) / many, across = sqrt(1 - z * z), angle = turn + 2.39996322972865 * i;
-    d[0] = across * cos(angle);
-    d[1] = across * sin(angle);
-    d[2] = z;
-}
-
 /* Takes a picture of the original from direction number i, its pixels behind `pixels`, under a light from
    elsewhere; as large as a level of so many Gaussians is drawn at most (ssdgs_object.levels). */
 static inline ssdgs_result reduce__picture(ssdgs_model *original, const ssdgs_real low[3],
@@ -442,6 +442,17 @@ static inline ssdgs_result reduce__picture(ssdgs_model *original, const ssdgs_re
     return result;
 }
 
+/* Options for a model that goes on: all terms, nothing but fine steps, no density control. */
+static inline void reduce_fine_steps(ssdgs_train_options *o, int iterations) {
+    o->iterations = iterations;
+    o->schedule = SSDGS_SCHEDULE_JOINT;
+    o->densify_until = o->opacity_reset_every = 0;
+    for (ssdgs_rate *rate = &o->rates.position; rate <= &o->rates.scattering; rate++) {
+        rate->start *= (ssdgs_real)(rate == &o->rates.position ? 0.03 : 0.3);
+        rate->end *= (ssdgs_real)0.3;
+    }
+}
+
 /* Teaches a level, which reduce_model() has made of its original, what that shows from all around, lit from
    all around: half a minute for 2,500 Gaussians. Models that are not trained, baked ones and media, and
    placed ones stay as they are. Where it fails the level may be half taught. */
@@ -456,14 +467,8 @@ static inline ssdgs_result reduce_teach(ssdgs_model *original, ssdgs_model *leve
         memcmp(&s->placement, &unplaced.placement, sizeof s->placement))
         return SSDGS_OK;
     ssdgs_train_options o = ssdgs_train_options_default();
-    o.iterations = REDUCE__LESSONS;
-    o.schedule = SSDGS_SCHEDULE_JOINT;
-    o.densify_until = o.opacity_reset_every = 0;
+    reduce_fine_steps(&o, REDUCE__LESSONS);
     o.prune_outside = 0;
-    for (ssdgs_rate *rate = &o.rates.position; rate <= &o.rates.scattering; rate++) { /* fine steps */
-        rate->start *= (ssdgs_real)(rate == &o.rates.position ? 0.03 : 0.3);
-        rate->end *= (ssdgs_real)0.3;
-    }
     ssdgs_result result = ssdgs_model_bounds(original, o.bounds_min, o.bounds_max);
     for (int i = 0; i < REDUCE__PICTURES && !result; i++)
         result = reduce__picture(original, o.bounds_min, o.bounds_max, ssdgs_model_peek(level).count, i,

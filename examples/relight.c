@@ -741,6 +741,7 @@ static int relight(job *j) {
         if (ssdgs_model_load(j->context, j->model_path, &original, NULL))
             return fail(ssdgs_error_message(j->context));
         result = reduce_model(j->context, &j->model, j->reduce);
+        fprintf(stderr, "%d Gaussians learn what the model shows\n", ssdgs_model_count(j->model));
         if (!result) result = reduce_teach(original, j->model);
         ssdgs_model_destroy(original);
         if (result) return fail(ssdgs_result_string(result));

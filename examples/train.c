@@ -359,8 +359,6 @@ typedef struct job {
     view_server view;
 } job;
 
-enum { RATES_OF_MODEL = 10 }; /* the first of ssdgs_rates: all but camera and light */
-
 static int parse(job *j, int argc, char **argv) {
     const char **given = j->given;
     int sets = 0, white = 0, preset = 0, seed = 1, isa = 0;
@@ -384,16 +382,7 @@ static int parse(job *j, int argc, char **argv) {
     ssdgs_settings unchanged;
     memcpy(&unchanged, &j->settings, sizeof unchanged);
     j->options = preset ? ssdgs_train_options_published() : ssdgs_train_options_default();
-    if (given[REFIT]) { /* nothing but fine steps */
-        j->options.iterations = 1000;
-        j->options.schedule = SSDGS_SCHEDULE_JOINT;
-        j->options.densify_until = j->options.opacity_reset_every = 0;
-        ssdgs_rate *rates = &j->options.rates.position;
-        for (int i = 0; i < RATES_OF_MODEL; i++) {
-            rates[i].start *= (ssdgs_real)(i ? 0.3 : 0.03);
-            rates[i].end *= (ssdgs_real)0.3;
-        }
-    }
+    if (given[REFIT]) reduce_fine_steps(&j->options, 1000);
     if (!choose(given, BACKGROUND, "black|white", &white))
         return usage("no such background:", given[BACKGROUND]);
     if (!choose(given, TRANSFER, "srgb|none|linear", &j->settings.transfer))

@@ -718,10 +718,14 @@ static void test_levels(void) {
         whole.level_count = 2;
         options.level_detail = (ssdgs_real)0.5;
         together(&whole, 1, &camera, &light, 1, &options, shot);
-        for (int c = 0; c < 3; c++) /* the box's centre lies on the world's y */
-            middle +=
-                (double)whole.to_world[4 + c] * (models[0]->bounds.low[c] + models[0]->bounds.high[c]) / 2;
-        const double needed = 0.5 * needed_of(models[0], scale, distance + middle, (double)camera.fx);
+        for (int i = 0; i < 3; i++) {
+            double from_eye = i == 1 ? distance : 0;
+            for (int c = 0; c < 3; c++)
+                from_eye += (double)whole.to_world[4 * i + c] *
+                            (models[0]->bounds.low[c] + models[0]->bounds.high[c]) / 2;
+            middle += from_eye * from_eye;
+        }
+        const double needed = 0.5 * needed_of(models[0], scale, sqrt(middle), (double)camera.fx);
         while (level < 2 && counts[level + 1] >= 1.1 * needed) level++;
         if (level < 2) share = (counts[level + 1] / needed - 1) / 0.1;
         want[0].model = models[level];
@@ -740,7 +744,6 @@ static void test_levels(void) {
         both += share > 0;
         options.level_detail = 0; /* the model itself, as with a mask or by exact */
         together(&whole, 1, &camera, &light, 1, &options, shot + 1);
-        together(want, 0, &camera, &light, 1, &options, shot + 2);
         want[0] = whole, want[0].level_count = 0;
         together(want, 1, &camera, &light, 1, &options, shot + 2);
         CHECK(same(shot + 1, shot + 2));
@@ -793,10 +796,20 @@ static void test_levels(void) {
         for (int i = 0; i < 3 * PIXELS; i++)
             pop = test_most(pop, fabs((double)shot[0].value[i] - (double)shot[1].value[i]));
     }
+    for (int i = 0; i < 2; i++) { /* towards it, then away: it casts the same shadows */
+        const ssdgs_real eye[3] = {0, -40, 0}, target[3] = {0, (ssdgs_real)(i ? -80 : 0), 0},
+                         up[3] = {0, 0, 1};
+        const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.7, SIDE, SIDE);
+        ssdgs_object whole = ssdgs_object_default(models[0]);
+        whole.levels = models + 1;
+        whole.level_count = 2;
+        together(&whole, 1, &camera, &light, 1, &options, shot);
+        CHECK(shot->stats.gaussians == counts[2] && (shot->stats.visible > 0) == !i);
+    }
     if (!CHECK(pop < 0.05 * apart)) printf("    pops by %g, %g apart\n", pop, apart);
     ssdgs_object object = ssdgs_object_default(models[1]);
     object.level_count = 1;
-    refused(&object, 1, "object 0: 1 levels at NULL");
+    refused(&object, 1, "object 0: 1 levels, but the array is NULL");
     object.levels = models, object.level_count = -1;
     refused(&object, 1, "object 0: -1 levels");
     object.level_count = 1;
@@ -806,10 +819,10 @@ static void test_levels(void) {
     object.levels = wrong;
     refused(&object, 1, "object 0: level 1 has 200 Gaussians, over four fifths of the 200 before it");
     object.levels = wrong + 2, object.level_count = 1;
-    refused(&object, 1, "object 0: level 0 is not of its model's context");
+    refused(&object, 1, "object 0: level 0 is NULL or has another context");
     s.transfer = SSDGS_TRANSFER_NONE;
     wrong[2] = cloud(&s, 0, 10, 0.5);
-    refused(&object, 1, "object 0: level 0 is not of its model's context, transfer or kind");
+    refused(&object, 1, "object 0: level 0 is NULL or has another context");
     ssdgs_model_destroy(wrong[2]);
     const int many = 32768; /* twice as many are one too many */
     ssdgs_object *objects = (ssdgs_object *)malloc((size_t)many * sizeof *objects);
