@@ -467,16 +467,18 @@ static void test_dead_neurons(void) {
         for (int i = 0; i < INS * SSDGS__BLOCK; i++) inputs[i] = (ssdgs_real)draw(9000 + (uint64_t)i);
         for (int i = 0; i < WIDE; i += 2)
             weights[INS * WIDE + i] = weights[(INS + 1) * WIDE + WIDE * WIDE + i] = -100; /* biases */
+        const ssdgs__network net = {sizes, 3, weights};
         ssdgs_real *dinputs[2];
+        uint64_t few = 0;
         for (int part = 0; part < 2; part++) {
             ssdgs__kernels k = *table;
             if (part) k.live_rows = all_rows;
             ssdgs__row_lists lists;
             ssdgs__row_lists_fill(&lists);
             memset(gradient[part], 0, sizeof gradient[part]);
-            const ssdgs__network net = {sizes, 3, weights};
             const ssdgs__network_scratch backward = {d[part], spare, transposed};
-            ssdgs__network_forward(&k, &net, &lists, inputs, outputs[part]);
+            ssdgs__network_forward(&k, &net, NULL, &lists, inputs, outputs[part]);
+            few = part ? few : lists.multiplied;
             CHECK(part ? lists.multiplied == lists.multipliable : lists.multiplied < lists.multipliable);
             for (int i = 0; i < OUTS * SSDGS__BLOCK; i++)
                 d[part][i] = (ssdgs_real)(draw(5000 + (uint64_t)i) - 0.5);
@@ -485,6 +487,19 @@ static void test_dead_neurons(void) {
             if (dinputs[part] == spare) memcpy(d[part], spare, sizeof spare);
         }
         CHECK(!memcmp(outputs[0], outputs[1], sizeof outputs[0]));
+        /* nor does it change a bit to sum up once what two lights' inputs have in common */
+        static ssdgs_real together[WIDE * SSDGS__BLOCK];
+        ssdgs__common common = {7, 0, together};
+        for (int light = 0; light < 2; light++) {
+            ssdgs__row_lists lists;
+            ssdgs__row_lists_fill(&lists);
+            for (int i = 0; light && i < INS * SSDGS__BLOCK; i++)
+                if (i < 7 * SSDGS__BLOCK) inputs[i] = 1e9f; /* is not read again */
+            memset(outputs[1], 0, sizeof outputs[1]);
+            ssdgs__network_forward(table, &net, &common, &lists, inputs, outputs[1]);
+            CHECK(common.made && !memcmp(outputs[0], outputs[1], sizeof outputs[0]));
+            CHECK(lists.multiplied == few - (uint64_t)(light ? 7 * WIDE : 0));
+        }
         CHECK(!memcmp(gradient[0], gradient[1], sizeof gradient[0]));
         CHECK(!memcmp(d[0], d[1], INS * SSDGS__BLOCK * sizeof d[0][0]));
         ssdgs__sum_slots(sizes, 3, gradient[0], 0, 1, 0, 1, sums);

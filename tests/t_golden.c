@@ -423,11 +423,11 @@ static void test_network(const char *name, int shadow, int residual, int default
     {
         ssdgs_real *outputs = part + (shadow ? l.shadow_at : l.scattering_at),
                    *head = outputs + BLOCK * (ssdgs__output_rows(sizes, layers) - (size_t)sizes[layers]);
-        ssdgs__encode_inputs(context->k, &object.settings, &l, shadow, gauss, part, inputs);
+        ssdgs__encode_inputs(context->k, &object.settings, &l, shadow, NULL, gauss, part, inputs);
         const ssdgs__network net = {sizes, layers, weights};
         const ssdgs__colour_in in = {
             gauss, part, part + l.visibility, shadow ? head : NULL, shadow ? NULL : head, NULL};
-        ssdgs__network_forward(context->k, &net, &lists, inputs, outputs);
+        ssdgs__network_forward(context->k, &net, NULL, &lists, inputs, outputs);
         context->k->colour(&k, &in, outs);
         out = (double *)malloc(BLOCK * 3 * sizeof *out);
         ssdgs_real one[3 * BLOCK];

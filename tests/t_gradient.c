@@ -626,7 +626,7 @@ static void test_octaves(void) {
             want[n] = k < 3 * octaves[i] ? sin(angle) : cos(angle);
         }
     }
-    ssdgs__encode_inputs(context->k, &object.settings, &l, 0, gauss, part, rows);
+    ssdgs__encode_inputs(context->k, &object.settings, &l, 0, NULL, gauss, part, rows);
     for (int i = 0; i < n; i++) rows[i] = rows[i * SSDGS__BLOCK];
     CHECK_NEAR(rows, want, n, 1e-12, 0, "the scattering network's inputs");
     free(gauss);
