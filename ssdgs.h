@@ -176,6 +176,7 @@ CHANGES, for programs written for 0.2.4
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
   a hook's view is `cached` 1    2; 1 says that WALK is to be done again
   ssdgs_scene_light(.., lights)  the camera before the lights, or NULL
+  ssdgs_to_pixels(image, ..)     ssdgs_to_pixels(context, image, ..), and ssdgs_blend_pixels() alike
   options.max_gaussians          what training ends with; before it may have options.surplus times as many
   raw planes of a baked model    14, and f_rest behind: ssdgs_model_view.channels; SSDGS_DIFFUSE is f_dc
 
@@ -657,16 +658,26 @@ SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
 /* Clamps, encodes by transfer and rounds (count) values to bytes, at most one level off. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
-typedef enum ssdgs_format { SSDGS_RGBA8 = 0, SSDGS_BGRA8, SSDGS_RGBA16F, SSDGS_RGBA32F } ssdgs_format;
-/* color and alpha of a rendering without background as pixels of straight alpha; without image->alpha opaque.
-   Bytes are encoded by transfer, halves and floats stay linear. pitch: bytes from row to row,
-   negative where `pixels` is the first row of an image stored bottom row first. */
-SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
-                               ssdgs_format format, void *pixels, ptrdiff_t pitch);
+/* Bytes in memory: SSDGS_BGRA8 is D3D's B8G8R8A8 and, on little-endian machines, SDL's ARGB8888 and
+   Irrlicht's and OGRE's A8R8G8B8. */
+typedef enum ssdgs_format {
+    SSDGS_RGBA8 = 0,
+    SSDGS_BGRA8,
+    SSDGS_RGBA16F,
+    SSDGS_RGBA32F,
+    SSDGS_PREMULTIPLIED = 16 /* may be added to a format */
+} ssdgs_format;
+/* color and alpha of a rendering without background as pixels of straight, or premultiplied, alpha; without
+   image->alpha opaque; 0 where alpha is. Bytes are encoded by transfer, halves and floats stay linear. A GPU
+   blends by light what is premultiplied and RGBA16F, or of sRGB bytes that it decodes, in a target that it
+   encodes. pitch: bytes from row to row, negative where `pixels` is the first row of an image stored bottom
+   row first. context: its threads do it; NULL, or in use by another thread: this thread alone. */
+SSDGS_API void ssdgs_to_pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,
+                               int transfer, int format, void *pixels, ptrdiff_t pitch);
 /* Lays such a rendering over a framebuffer: pixels become color + (1 - alpha) x what they hold, by light, so
    bytes are decoded and encoded again. Where alpha is 0 they stay as they are. */
-SSDGS_API void ssdgs_blend_pixels(const ssdgs_image *image, int width, int height, int transfer,
-                                  ssdgs_format format, void *pixels, ptrdiff_t pitch);
+SSDGS_API void ssdgs_blend_pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,
+                                  int transfer, int format, void *pixels, ptrdiff_t pitch);
 /* Stored values (pixels,3) of such a rendering laid over `background`, stored values too. stored may be
    color. */
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,
@@ -1076,11 +1087,13 @@ typedef struct ssdgs_frame {
     ssdgs_real *diffuse, *specular, *scattering, *normal,
         *shadow; /* (n, 4) each; shadow: S, depth; NULL: light is deferred */
     /* SSDGS_STAGE_COMPOSITE */
-    ssdgs_real *pixels;            /* (3, h, w) without background */
-    ssdgs_real *layer_pixels;      /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
-                                      nothing is; for components. In training, where pixel_shadow is NULL, it
-                                      is (2, 3, h, w): camera depth, F0, 1; normal */
-    ssdgs_real *transmittance;     /* (h, w) */
+    ssdgs_real *pixels;        /* (3, h, w) without background */
+    ssdgs_real *layer_pixels;  /* (1 + layer_count, 3, h, w) the colour and the layers, blended; 0 where
+                                  nothing is; for components. In training, where pixel_shadow is NULL, it
+                                  is (2, 3, h, w): camera depth, F0, 1; normal */
+    ssdgs_real *transmittance; /* (h, w) */
+    unsigned char *empty; /* (tiles) 0 as COMPOSITE begins; 1: there is nothing, and the planes say nothing;
+                             NULL: they do everywhere */
     ssdgs_real *median_depth;      /* (h, w) as in ssdgs_image; NULL: not asked for */
     const ssdgs_real *scene_depth; /* (h, stride) as in ssdgs_image; for WALK and COMPOSITE */
     int stride;
@@ -1840,7 +1853,7 @@ static void ssdgs__pool_forked(ssdgs_context *context);
 static ssdgs_result ssdgs__enter(ssdgs_context *context, const char *refusal) {
     if (SSDGS__GLANCE(&context->telling)) return SSDGS_ERR_ARGUMENT; /* the message being told stays */
     if (SSDGS__EXCHANGE(&context->busy, 1)) {
-        SSDGS__PUBLISH_TEXT(&context->refusal, refusal);
+        if (refusal) SSDGS__PUBLISH_TEXT(&context->refusal, refusal);
         return SSDGS_ERR_ARGUMENT;
     }
     ssdgs__pool_forked(context);
@@ -3246,7 +3259,8 @@ typedef struct ssdgs__frame_memory {
 /* Of a context: every frame writes it anew. */
 typedef struct ssdgs__scratch {
     ssdgs__buffer shaded, color, component[5], pixels, transmittance, layers, layer_pixels, pixel_visibility,
-        pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, median, activations, scratch;
+        pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, median, empty, activations,
+        scratch;
     ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
         splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals, photo_lights;
 } ssdgs__scratch;
@@ -4444,18 +4458,21 @@ static int ssdgs__in_light(const ssdgs_light *light, const ssdgs_placed *o) {
     return angle - asin(o->radius / distance) <= (double)light->cone[1] + 1e-3;
 }
 
-/* Where the objects of several are, and which of them the camera and the lights reach. */
-static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame) {
+/* Where the objects are, and of several which of them the camera and the lights reach. sees: whether the
+   camera any. */
+static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int *sees) {
     ssdgs_context *context = frame->context;
-    const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1;
+    const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1,
+              boxed = !frame->training;
     unsigned char *reach;
     SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, ssdgs__times((size_t)count + 1, (size_t)rows));
     frame->reach = several ? reach : NULL;
+    *sees = 0;
     for (int i = 0; i < count; i++) {
         ssdgs_placed *o = frame->objects + i;
         const ssdgs_model *model = o->model;
         double half2 = 0;
-        if (several) SSDGS__TRY(ssdgs__model_box(o->model));
+        if (boxed) SSDGS__TRY(ssdgs__model_box(o->model));
         for (int c = 0; c < 3; c++) {
             const double half = (model->high[c] - model->low[c]) / 2;
             half2 += half * half;
@@ -4465,11 +4482,12 @@ static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame) {
                     (double)o->scale * (double)o->rotation[3 * c + j] * (model->high[j] + model->low[j]) / 2;
         }
         o->radius = (double)o->scale * sqrt(half2) * (1 + 1e-5);
-        const int anywhere = !several || !(o->radius < 1e30); /* with Gaussians that are not finite */
+        const int anywhere = !boxed || !(o->radius < 1e30); /* with Gaussians that are not finite */
         for (int row = 0; row < rows; row++) {
             const int in =
                 anywhere || (row ? ssdgs__in_light(frame->lights + row - 1, o) : ssdgs__in_sight(frame, o));
             reach[(ptrdiff_t)row * count + i] = (unsigned char)in;
+            *sees |= !row && in;
         }
     }
     return SSDGS_OK;
@@ -4647,7 +4665,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         ssdgs__place_all(frame, request->objects, request->object_count, request->lights, light_count));
     for (int i = 0; ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
         SSDGS__TRY(ssdgs__sky_shares_of(frame->objects + i));
-    SSDGS__TRY(ssdgs__find_reach(frame));
+    int sees;
+    SSDGS__TRY(ssdgs__find_reach(frame, &sees));
     const size_t n = (size_t)frame->count + SSDGS__BLOCK;
     if (frame->settings.baked) frame->options.max_error = 0; /* nothing is dear to shade */
     memset(m->counts, 0, sizeof m->counts);
@@ -4692,6 +4711,11 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     SSDGS__RESERVE(w->pixels, frame->pixels, ssdgs_real, pixels * 3);
     SSDGS__RESERVE(w->transmittance, frame->transmittance, ssdgs_real, pixels);
     if (image && image->median_depth) SSDGS__RESERVE(w->median, frame->median_depth, ssdgs_real, pixels);
+    if (!training && !components) {
+        const size_t tiles = (size_t)((camera->width + 15) / 16) * (size_t)((camera->height + 15) / 16);
+        SSDGS__RESERVE(w->empty, frame->empty, unsigned char, tiles);
+        memset(frame->empty, 0, tiles);
+    }
     if (training) {
         SSDGS__RESERVE(w->pixel_gradient, frame->pixel_gradient, ssdgs_real, ssdgs__times(pixels, 4));
         SSDGS__RESERVE(w->splat_gradient, frame->splat_gradient, ssdgs_real, n * SSDGS__SPLAT);
@@ -4699,7 +4723,7 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
         SSDGS__RESERVE(w->gradient, frame->gradient, ssdgs_real, frame->gaussians.stride * SSDGS_CHANNELS);
         SSDGS__RESERVE(w->global_gradient, frame->global_gradient, ssdgs_real, frame->model->global_count);
     }
-    const int wanted = !(mapped | transport)
+    const int wanted = !(mapped | transport) || (!sees && !frame->maps && !training)
                            ? 0
                            : SSDGS__MADE_VISIBILITY | (ssdgs__wants_maps(frame) ? SSDGS__MADE_MAP : 0) |
                                  (cue ? SSDGS__MADE_CUE : 0) | (transport ? SSDGS__MADE_FLUX : 0);
@@ -6705,7 +6729,7 @@ static ssdgs_result ssdgs__shade(ssdgs_frame *frame) {
         }
     }
     job.counts = frame->memory->counts;
-    if (transport) SSDGS__TRY(ssdgs__transport(frame, &job.transport));
+    if (transport && frame->shaded_count) SSDGS__TRY(ssdgs__transport(frame, &job.transport));
     ssdgs__parallel(context, SSDGS__SLOTS, ssdgs__shade_task, &job);
     return SSDGS_OK;
 }
@@ -7126,6 +7150,10 @@ static void ssdgs__composite_task(void *data, int index) {
     const ssdgs__composite_job *job = (const ssdgs__composite_job *)data;
     const ssdgs_frame *frame = job->frame;
     ssdgs__tile tile = ssdgs__tile_of(frame, frame->views, index, 1);
+    if (frame->empty && !tile.count) {
+        frame->empty[index] = 1;
+        return;
+    }
     const int layers =
         frame->layer_count && tile.count ? SSDGS__LAYERS : 1; /* where there is nothing, nothing shines */
     const ssdgs_real *color[SSDGS__LAYERS];
@@ -7480,25 +7508,34 @@ typedef struct ssdgs__rows_job {
     const ssdgs_frame *frame;
     const ssdgs_real *planes;
     ssdgs_real *out, background[3];
-    int channels;
+    int channels, shows; /* 1: where there is nothing, this is not 0 */
 } ssdgs__rows_job;
 
 static void ssdgs__rows_task(void *data, int index) {
     const ssdgs__rows_job *job = (const ssdgs__rows_job *)data;
-    const int w = job->frame->camera.width, h = job->frame->camera.height, n = job->channels;
+    const ssdgs_frame *frame = job->frame;
+    const int w = frame->camera.width, h = frame->camera.height, n = job->channels;
     const int end = (index + 1) * SSDGS__BAND < h ? (index + 1) * SSDGS__BAND : h;
-    const size_t plane = (size_t)w * (size_t)h, stride = (size_t)job->frame->stride;
+    const size_t plane = (size_t)w * (size_t)h;
+    const unsigned char *empty = frame->empty;
     for (int y = index * SSDGS__BAND; y < end; y++) {
-        const ssdgs_real *t = job->frame->transmittance + (size_t)y * (size_t)w,
-                         *red = job->planes ? job->planes + (size_t)y * (size_t)w : NULL;
-        ssdgs_real *rgb = job->out + (size_t)y * stride * 3;
-        for (int x = 0; n == 3 && x < w; x++, rgb += 3) {
-            rgb[0] = red[x] + t[x] * job->background[0];
-            rgb[1] = red[plane + (size_t)x] + t[x] * job->background[1];
-            rgb[2] = red[2 * plane + (size_t)x] + t[x] * job->background[2];
+        const ssdgs_real *t = frame->transmittance + (size_t)y * (size_t)w,
+                         *from = job->planes ? job->planes + (size_t)y * (size_t)w : NULL;
+        ssdgs_real *row = job->out + (size_t)y * (size_t)frame->stride * (size_t)n;
+        const unsigned char *tiles = empty ? empty + (size_t)(y / 16) * (size_t)((w + 15) / 16) : NULL;
+        for (int x = 0, next; x < w; x = next) { /* so many that are all empty, or none is */
+            const int nothing = tiles && tiles[x / 16];
+            for (next = x / 16 * 16 + 16; tiles && next < w && tiles[next / 16] == nothing; next += 16) {}
+            next = tiles && next < w ? next : w;
+            ssdgs_real *to = row + (size_t)(n * x);
+            if (nothing && !job->shows) memset(to, 0, (size_t)(n * (next - x)) * sizeof *to);
+            else
+                for (int i = x; i < next; i++, to += n)
+                    for (int c = 0; c < n; c++) {
+                        const ssdgs_real own = !from ? 1 : nothing ? 0 : from[plane * (size_t)c + (size_t)i];
+                        to[c] = own + (nothing ? 1 : t[i]) * job->background[c];
+                    }
         }
-        for (int x = 0; n == 1 && x < w; x++)
-            job->out[(size_t)y * stride + (size_t)x] = (job->planes ? red[x] : 1) + t[x] * job->background[0];
     }
 }
 
@@ -7506,8 +7543,12 @@ static void ssdgs__rows_task(void *data, int index) {
    of NULL is 1. */
 static void ssdgs__write_rows(const ssdgs_frame *frame, const ssdgs_real *planes, int channels,
                               const ssdgs_real *background, ssdgs_real *out) {
-    ssdgs__rows_job job = {frame, planes, out, {0, 0, 0}, channels};
+    ssdgs__rows_job job = {frame, planes, out, {0, 0, 0}, channels, 0};
     if (background) memcpy(job.background, background, sizeof job.background);
+    for (int c = 0; c < channels; c++) {
+        const ssdgs_real there = (planes ? 0 : 1) + job.background[c];
+        job.shows |= there < 0 || there > 0;
+    }
     ssdgs__parallel(frame->context, (frame->camera.height + SSDGS__BAND - 1) / SSDGS__BAND, ssdgs__rows_task,
                     &job);
 }
@@ -8074,35 +8115,68 @@ static void ssdgs__pixel_put(const ssdgs__framebuffer *f, const ssdgs_real rgba[
     else memcpy(to, wide, sizeof wide);
 }
 
-static void ssdgs__pixels(const ssdgs_image *image, int width, int height, int transfer, ssdgs_format format,
-                          int blend, void *pixels, ptrdiff_t pitch) {
+typedef struct ssdgs__pixels_job {
     ssdgs__framebuffer f;
-    if (!image || !image->color || !pixels) return;
-    ssdgs__framebuffer_make(&f, transfer, format);
-    for (int y = 0; y < height; y++) {
-        const size_t row = (size_t)y * (size_t)(image->stride ? image->stride : width);
-        const ssdgs_real *color = image->color + 3 * row, *alpha = image->alpha ? image->alpha + row : NULL;
-        unsigned char *to = (unsigned char *)pixels + y * pitch;
-        for (int x = 0; x < width; x++, color += 3, to += f.size) {
-            const ssdgs_real a = alpha ? alpha[x] : 1, by = 1 / (a > SSDGS__THIN ? a : SSDGS__THIN);
-            ssdgs_real rgba[4] = {0, 0, 0, 0};
-            if (blend && !(a > 0)) continue;
-            if (blend) ssdgs__pixel_get(&f, to, rgba);
-            for (int c = 0; c < 3; c++) rgba[c] = blend ? color[c] + (1 - a) * rgba[c] : color[c] * by;
-            rgba[3] = blend ? a + (1 - a) * rgba[3] : a;
-            ssdgs__pixel_put(&f, rgba, to);
+    const ssdgs_image *image;
+    int width, height, blend, straight;
+    unsigned char *pixels;
+    ptrdiff_t pitch;
+} ssdgs__pixels_job;
+
+/* Sixteen rows. */
+static void ssdgs__pixels_task(void *data, int index) {
+    const ssdgs__pixels_job *job = (const ssdgs__pixels_job *)data;
+    const ssdgs__framebuffer *f = &job->f;
+    for (int y = 16 * index; y < 16 * index + 16 && y < job->height; y++) {
+        const size_t row = (size_t)y * (size_t)(job->image->stride ? job->image->stride : job->width);
+        const ssdgs_real *color = job->image->color + 3 * row,
+                         *alpha = job->image->alpha ? job->image->alpha + row : NULL;
+        unsigned char *to = job->pixels + y * job->pitch;
+        for (int x = 0, next; x < job->width; x = next) {
+            for (next = x; alpha && next < job->width && !(alpha[next] > 0); next++) {}
+            if (!job->blend) memset(to + (size_t)(f->size * x), 0, (size_t)(f->size * (next - x)));
+            for (; next < job->width && (!alpha || alpha[next] > 0); next++) {
+                unsigned char *pixel = to + (size_t)(f->size * next);
+                const ssdgs_real a = alpha ? alpha[next] : 1,
+                                 by = job->straight ? 1 / (a > SSDGS__THIN ? a : SSDGS__THIN) : 1;
+                ssdgs_real rgba[4] = {0, 0, 0, 0};
+                if (job->blend) ssdgs__pixel_get(f, pixel, rgba);
+                for (int c = 0; c < 3; c++)
+                    rgba[c] = job->blend ? color[3 * next + c] + (1 - a) * rgba[c] : color[3 * next + c] * by;
+                rgba[3] = job->blend ? a + (1 - a) * rgba[3] : a;
+                ssdgs__pixel_put(f, rgba, pixel);
+            }
         }
     }
 }
 
-SSDGS_API void ssdgs_to_pixels(const ssdgs_image *image, int width, int height, int transfer,
-                               ssdgs_format format, void *pixels, ptrdiff_t pitch) {
-    ssdgs__pixels(image, width, height, transfer, format, 0, pixels, pitch);
+static void ssdgs__pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,
+                          int transfer, int format, int blend, void *pixels, ptrdiff_t pitch) {
+    ssdgs__pixels_job job;
+    if (!image || !image->color || !pixels) return;
+    ssdgs__framebuffer_make(&job.f, transfer, (ssdgs_format)(format & ~SSDGS_PREMULTIPLIED));
+    job.image = image;
+    job.width = width;
+    job.height = height;
+    job.blend = blend;
+    job.straight = !blend && !(format & SSDGS_PREMULTIPLIED);
+    job.pixels = (unsigned char *)pixels;
+    job.pitch = pitch;
+    const int tasks = height > 0 ? (height - 1) / 16 + 1 : 0;
+    const int free_to_help = context && !ssdgs__enter(context, NULL);
+    if (free_to_help) ssdgs__parallel(context, tasks, ssdgs__pixels_task, &job);
+    for (int i = 0; i < tasks && !free_to_help; i++) ssdgs__pixels_task(&job, i);
+    if (free_to_help) (void)ssdgs__leave(context, SSDGS_OK);
 }
 
-SSDGS_API void ssdgs_blend_pixels(const ssdgs_image *image, int width, int height, int transfer,
-                                  ssdgs_format format, void *pixels, ptrdiff_t pitch) {
-    ssdgs__pixels(image, width, height, transfer, format, 1, pixels, pitch);
+SSDGS_API void ssdgs_to_pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,
+                               int transfer, int format, void *pixels, ptrdiff_t pitch) {
+    ssdgs__pixels(context, image, width, height, transfer, format, 0, pixels, pitch);
+}
+
+SSDGS_API void ssdgs_blend_pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,
+                                  int transfer, int format, void *pixels, ptrdiff_t pitch) {
+    ssdgs__pixels(context, image, width, height, transfer, format, 1, pixels, pitch);
 }
 
 SSDGS_API void ssdgs_compose(const ssdgs_real *color, const ssdgs_real *alpha, size_t pixels, int transfer,

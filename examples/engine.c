@@ -200,7 +200,7 @@ static ssdgs_result shade_meshes(level *l) {
     ssdgs_image image;
     memset(&image, 0, sizeof image);
     image.color = l->lit;
-    ssdgs_to_pixels(&image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,
+    ssdgs_to_pixels(l->context, &image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,
                     4 * (ptrdiff_t)l->width);
     return SSDGS_OK;
 }
@@ -300,8 +300,8 @@ static ssdgs_result draw_frame(level *l, float t) {
         result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options,
                                     &image, &l->stats);
     if (!result)
-        ssdgs_blend_pixels(&image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, l->pixels,
-                           4 * (ptrdiff_t)l->width);
+        ssdgs_blend_pixels(l->context, &image, l->width, l->height, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8,
+                           l->pixels, 4 * (ptrdiff_t)l->width);
     return result;
 }
 

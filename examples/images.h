@@ -1695,8 +1695,8 @@ static int olat__exr_decode(const char *name, const unsigned char *bytes, size_t
     image.color = e.color;
     image.alpha = e.alpha;
     if (!e.problem)
-        ssdgs_to_pixels(&image, *width, *height, SSDGS_TRANSFER_NONE, e.wide ? SSDGS_RGBA32F : SSDGS_RGBA16F,
-                        *pixels, (ptrdiff_t)pitch);
+        ssdgs_to_pixels(NULL, &image, *width, *height, SSDGS_TRANSFER_NONE,
+                        e.wide ? SSDGS_RGBA32F : SSDGS_RGBA16F, *pixels, (ptrdiff_t)pitch);
     found->broken += e.broken;
     free(e.raw), free(e.turned), free(e.piz), free(e.color), free(e.alpha);
     return e.problem ? olat__fail(error, "%s: byte %lu: %s", olat__tail(name), (unsigned long)e.at, e.problem)

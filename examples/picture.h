@@ -287,7 +287,7 @@ static ssdgs_result view__draw(view_show *s, ssdgs_scene **scene, const view__wi
         for (size_t i = 0; i < 3 * pixels; i++) value[i] *= (float)w->value[VIEW__EXPOSURE][0];
         memset(&image, 0, sizeof image);
         image.color = value;
-        ssdgs_to_pixels(&image, width, height, transfer, SSDGS_RGBA8, s->bytes, 4 * width);
+        ssdgs_to_pixels(NULL, &image, width, height, transfer, SSDGS_RGBA8, s->bytes, 4 * width);
         return SSDGS_OK;
     }
     float depth = 0;

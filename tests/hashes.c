@@ -309,9 +309,9 @@ static ssdgs_result place(ssdgs_model *model) {
         see(planes, sizeof planes);
     }
     for (int format = SSDGS_RGBA8; format <= SSDGS_RGBA16F; format++) {
-        ssdgs_to_pixels(&image, SIDE, SIDE, SSDGS_TRANSFER_SRGB, (ssdgs_format)format, bytes, SIDE * 8);
+        ssdgs_to_pixels(NULL, &image, SIDE, SIDE, SSDGS_TRANSFER_SRGB, format, bytes, SIDE * 8);
         see(bytes, sizeof bytes);
-        ssdgs_blend_pixels(&image, SIDE, SIDE, SSDGS_TRANSFER_SRGB, (ssdgs_format)format, bytes, SIDE * 8);
+        ssdgs_blend_pixels(NULL, &image, SIDE, SIDE, SSDGS_TRANSFER_SRGB, format, bytes, SIDE * 8);
         see(bytes, sizeof bytes);
     }
     ssdgs_scene_destroy(scene);

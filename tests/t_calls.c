@@ -108,6 +108,20 @@ static void refused(ssdgs_result result, const char *function) {
 #define IGNORED(function, ...) \
     (all.calls < all.tries ? (void)0 : (function(__VA_ARGS__), refused(SSDGS_ERR_ARGUMENT, #function)))
 
+/* Pixels are made all the same, by the calling thread alone, and the message stays. */
+static void make_pixels(void) {
+    ssdgs_real one[3] = {(ssdgs_real)0.5, (ssdgs_real)0.25, 1};
+    unsigned char bytes[4] = {0, 0, 0, 0};
+    char before[200];
+    ssdgs_image from;
+    memset(&from, 0, sizeof from);
+    from.color = one;
+    snprintf(before, sizeof before, "%s", ssdgs_error_message(all.context));
+    ssdgs_to_pixels(all.context, &from, 1, 1, SSDGS_TRANSFER_NONE, SSDGS_BGRA8, bytes, 4);
+    CHECK(bytes[0] == 255 && bytes[1] == 64 && bytes[2] == 128 && bytes[3] == 255);
+    CHECK(!strcmp(before, ssdgs_error_message(all.context)));
+}
+
 /* Makes every call that may not be made while another is at work (tests/builds.sh looks that none is
    missing); each must be refused, and nothing may change or crash. */
 static void call_everything(void) {
@@ -116,6 +130,7 @@ static void call_everything(void) {
     ssdgs_model *model = all.model, *other = NULL;
     ssdgs_trainer *trainer = all.trainer, *next = NULL;
     ssdgs_photo copy;
+    make_pixels();
     const ssdgs_object object = ssdgs_object_default(model);
     ssdgs_gaussian gaussian = ssdgs_gaussian_default();
     const ssdgs_real rough[2] = {(ssdgs_real)0.3, (ssdgs_real)0.3};
@@ -635,8 +650,8 @@ static void test_null(void) {
     ssdgs_compose(three, NULL, 1, 0, three, &value);
     ssdgs_compose(three, &value, 1, 0, NULL, &value);
     ssdgs_compose(three, &value, 1, 0, three, NULL);
-    ssdgs_to_pixels(NULL, 1, 1, 0, SSDGS_RGBA8, &byte, 4);
-    ssdgs_to_pixels(&image, 1, 1, 0, SSDGS_RGBA8, NULL, 4);
+    ssdgs_to_pixels(NULL, NULL, 1, 1, 0, SSDGS_RGBA8, &byte, 4);
+    ssdgs_to_pixels(NULL, &image, 1, 1, 0, SSDGS_RGBA8, NULL, 4);
     CHECK(byte == 7 && value >= 7 && value <= 7);
     ssdgs_trainer_destroy(NULL);
     ssdgs_model_destroy(NULL);
@@ -742,7 +757,7 @@ static void test_halves(void) {
             linear[i] = (ssdgs_real)(value + (next - value) * (i / 3 == 0 ? 0 : i / 3 == 1 ? 0.5 : 0.75));
         memset(&from, 0, sizeof from);
         from.color = linear;
-        ssdgs_to_pixels(&from, 3, 1, SSDGS_TRANSFER_SRGB, SSDGS_RGBA16F, out, 24);
+        ssdgs_to_pixels(NULL, &from, 3, 1, SSDGS_TRANSFER_SRGB, SSDGS_RGBA16F, out, 24);
         const int last =
             (half & 0x7FFF) == 0x7BFF; /* half_value() of what follows is the number infinity is for */
         wrong += out[0] != half || out[4] != (half & 1 ? half + 1 : half) || out[8] != half + 1;
@@ -754,14 +769,14 @@ static void test_halves(void) {
     uint16_t out[4];
     memset(&from, 0, sizeof from);
     from.color = linear;
-    ssdgs_to_pixels(&from, 1, 1, SSDGS_TRANSFER_SRGB, SSDGS_RGBA16F, out, 8);
+    ssdgs_to_pixels(NULL, &from, 1, 1, SSDGS_TRANSFER_SRGB, SSDGS_RGBA16F, out, 8);
     ssdgs_image veil;
     memset(&veil, 0, sizeof veil);
     ssdgs_real black[3] = {0, 0, 0}, cover = (ssdgs_real)0.5;
     veil.color = black, veil.alpha = &cover;
     for (uint16_t small = 2; small < 0x800; small = (uint16_t)(small + 2)) { /* subnormal and a little more */
         uint16_t under[4] = {small, (uint16_t)(small | 0x8000), 0, 0};
-        ssdgs_blend_pixels(&veil, 1, 1, SSDGS_TRANSFER_NONE, SSDGS_RGBA16F, under, 8);
+        ssdgs_blend_pixels(NULL, &veil, 1, 1, SSDGS_TRANSFER_NONE, SSDGS_RGBA16F, under, 8);
         wrong += half_value(under[0]) != half_value(small) / 2 || under[1] != (under[0] | 0x8000);
     }
     CHECK(wrong == 0);
@@ -800,7 +815,7 @@ static void test_blended(void) {
             memcpy(bytes_before, bytes, sizeof bytes);
             memcpy(halves_before, halves, sizeof halves);
             memcpy(floats_before, floats, sizeof floats);
-            ssdgs_blend_pixels(&from, N / 4, 4, transfer, (ssdgs_format)format, to,
+            ssdgs_blend_pixels(NULL, &from, N / 4, 4, transfer, format, to,
                                N * (format == SSDGS_RGBA32F   ? 4
                                     : format == SSDGS_RGBA16F ? 2
                                                               : 1));
@@ -849,7 +864,7 @@ static void test_pixels(void) {
                 int wrong = 0;
                 from.alpha = opaque ? NULL : alphas;
                 memset(out, 77, sizeof out);
-                ssdgs_to_pixels(&from, W, H, SSDGS_TRANSFER_SRGB, bgra ? SSDGS_BGRA8 : SSDGS_RGBA8,
+                ssdgs_to_pixels(NULL, &from, W, H, SSDGS_TRANSFER_SRGB, bgra ? SSDGS_BGRA8 : SSDGS_RGBA8,
                                 up ? out + (H - 1) * PITCH : out, up ? -PITCH : PITCH);
                 for (int y = 0; y < H; y++)
                     for (int x = 0; x < PITCH; x++) {
@@ -938,10 +953,11 @@ static void test_rows(void) {
     tear_down();
 }
 
-/* A framebuffer's rows may be far apart, or stored the last one first, in every format. Floats hold the
-   straight colour as it is. Where alpha is 0 no bit changes, not even of what is no number. */
+/* A framebuffer's rows may be far apart, or stored the last one first, in every format, by one thread or a
+   context's. Floats hold the straight colour, or the premultiplied one as it is. Where alpha is 0 pixels
+   become 0, and nothing is blended: no bit changes, not even of what is no number. */
 static void test_pitch(void) {
-    enum { W = 5, H = 4, STRIDE = 7, PITCH = 16 * W + 12 };
+    enum { W = 5, H = 37, STRIDE = 7, PITCH = 16 * W + 12 };
     static const int sizes[4] = {4, 4, 8, 16};
     static ssdgs_real colors[3 * STRIDE * H], alphas[STRIDE * H], none[STRIDE * H];
     unsigned char packed[16 * W * H], apart[PITCH * H], before[PITCH * H];
@@ -960,12 +976,12 @@ static void test_pitch(void) {
                 unsigned char *first = up ? apart + (H - 1) * PITCH : apart;
                 memset(apart, 77, sizeof apart);
                 for (int blend = 0; blend < 2; blend++) { /* over what the first round has written */
-                    void (*write)(const ssdgs_image *, int, int, int, ssdgs_format, void *, ptrdiff_t) =
-                        blend ? ssdgs_blend_pixels : ssdgs_to_pixels;
+                    void (*write)(ssdgs_context *, const ssdgs_image *, int, int, int, int, void *,
+                                  ptrdiff_t) = blend ? ssdgs_blend_pixels : ssdgs_to_pixels;
                     int wrong = 0;
                     from.alpha = alphas;
-                    write(&from, W, H, transfer, (ssdgs_format)format, packed, W * size);
-                    write(&from, W, H, transfer, (ssdgs_format)format, first, up ? -PITCH : PITCH);
+                    write(NULL, &from, W, H, transfer, format, packed, W * size);
+                    write(up ? NULL : home, &from, W, H, transfer, format, first, up ? -PITCH : PITCH);
                     for (int y = 0; y < H; y++) {
                         const unsigned char *row = apart + (up ? H - 1 - y : y) * PITCH;
                         wrong += memcmp(row, packed + y * W * size, (size_t)(W * size)) != 0;
@@ -983,10 +999,25 @@ static void test_pitch(void) {
                         CHECK_NEAR(rgba, want, 4, 1e-30, 1e-6, "floats of a straight colour");
                     }
                 }
+                ssdgs_to_pixels(home, &from, W, H, transfer, format + SSDGS_PREMULTIPLIED, packed, W * size);
+                for (int i = 0; i < W * H; i++) {
+                    const int at = i / W * STRIDE + i % W;
+                    const ssdgs_real *c = colors + 3 * at;
+                    float rgba[4];
+                    memcpy(rgba, packed + size * i, format == SSDGS_RGBA32F ? 16 : 4);
+                    if (format == SSDGS_RGBA32F)
+                        CHECK(rgba[0] == (float)c[0] && rgba[2] == (float)c[2] &&
+                              rgba[3] == (float)alphas[at]);
+                    if (format > SSDGS_BGRA8) continue;
+                    unsigned char bytes[3];
+                    ssdgs_to_bytes(c, 3, transfer, bytes);
+                    CHECK(packed[4 * i] == bytes[format == SSDGS_BGRA8 ? 2 : 0] &&
+                          packed[4 * i + 1] == bytes[1]);
+                }
                 for (int i = 0; i < PITCH * H; i++)
                     apart[i] = before[i] = (unsigned char)(256 * test_uniform(10, (uint64_t)i));
                 from.alpha = none;
-                ssdgs_blend_pixels(&from, W, H, transfer, (ssdgs_format)format, first, up ? -PITCH : PITCH);
+                ssdgs_blend_pixels(home, &from, W, H, transfer, format, first, up ? -PITCH : PITCH);
                 CHECK(!memcmp(apart, before, sizeof before));
             }
 }

@@ -66,7 +66,7 @@ static void render(int i, const ssdgs_light *lights, int count, float *to) {
     memset(&image, 0, sizeof image);
     image.color = color, image.alpha = alpha;
     if (!CHECK(!ssdgs_render(model, &frames[i].camera, lights, count, &image))) exit(1);
-    ssdgs_to_pixels(&image, SIDE, SIDE, SSDGS_TRANSFER_SRGB, SSDGS_RGBA32F, to,
+    ssdgs_to_pixels(NULL, &image, SIDE, SIDE, SSDGS_TRANSFER_SRGB, SSDGS_RGBA32F, to,
                     4 * SIDE * (ptrdiff_t)sizeof *to);
 }
 

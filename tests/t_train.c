@@ -2528,8 +2528,8 @@ static void test_clipped(void) {
         ssdgs_real alpha[SIDE * SIDE];
         out.alpha = alpha;
         CHECK(!ssdgs_render_ex(model, &photo.camera, &photo.light, 1, &exact, &out, NULL));
-        ssdgs_to_pixels(&out, SIDE, SIDE, transfer, SSDGS_RGBA16F, halves, 8 * SIDE);
-        ssdgs_to_pixels(&out, SIDE, SIDE, transfer, SSDGS_RGBA32F, floats, 16 * SIDE);
+        ssdgs_to_pixels(NULL, &out, SIDE, SIDE, transfer, SSDGS_RGBA16F, halves, 8 * SIDE);
+        ssdgs_to_pixels(NULL, &out, SIDE, SIDE, transfer, SSDGS_RGBA32F, floats, 16 * SIDE);
         for (int way = 0; way < 5; way++) {
             const int dim = way == 1;
             int i, full;
