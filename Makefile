@@ -9,6 +9,7 @@ FUZZ_SECONDS = 1800
 FUZZ_TARGETS = render scene train ply checkpoint png exr unfilter inflate dataset json json_string hooks splats
 SCENES = waxcow:black blocks:white anisometal:white
 LDLIBS = -lm -lpthread
+WINDOWS = $(filter Windows_NT,$(OS))$(findstring mingw,$(CC))
 WARNINGS = -Werror -Wall -Wextra -Wpedantic -Wshadow -Wundef -Wconversion -Wdouble-promotion -Wcast-align -Wcast-qual
 STRICT_1 = $(WARNINGS) $(if $(findstring ++,$(CC)),,-Wstrict-prototypes -Wmissing-prototypes)
 COMPILE = $(CC) $(CFLAGS) $(STRICT_$(STRICT)) -DSSDGS_SCALAR -DSSDGS_STAGES # tests try the scalar kernels and the stages too
@@ -162,7 +163,7 @@ help: ## this list
 	@sed -n 's/^\([a-z0-9-]*\):.*## /\1: /p' Makefile
 
 $(BUILD):
-	mkdir -p $(BUILD)
+	mkdir -p $(BUILD) build # where tests write
 $(BUILD)/ssdgs.o $(BUILD)/ssdgs_64.o: tests/library.c ssdgs.h tests/kernels.h | $(BUILD)
 	$(COMPILE) $(KERNELS) $(if $(filter %_64.o,$@),-DSSDGS_REAL64) -c $< -o $@
 $(BUILD)/kernels.o $(BUILD)/kernels_64.o: tests/library.c ssdgs.h tests/kernels.h | $(BUILD)
@@ -174,10 +175,11 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
 $(BUILD)/t_ball: examples/ball.c
+$(BUILD)/train $(BUILD)/view: LDLIBS += $(if $(WINDOWS),-lws2_32)
 # What has the GPU's stages
 $(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: examples/gpu/gpu_gl.c $(BUILD)/gpu_shaders.h
 $(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: PROGRAM += -I$(BUILD)
-$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: LDLIBS += -ldl
+$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: LDLIBS += $(if $(WINDOWS),,-ldl)
 $(BUILD)/gpu_shaders.h: examples/gpu/shaders.awk $(wildcard examples/gpu/*.comp examples/gpu/*.glsl) | $(BUILD)
 	awk -f $(filter-out %.glsl,$^) >$@ || { rm -f $@; exit 1; }
 $(BUILD)/t_check: examples/check.c

@@ -158,7 +158,8 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
   SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD  leave these kernels out; SSDGS_SCALAR adds the scalar ones
   SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
-  SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests
+  SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests. A program that has it
+                        and a library that has not lack ssdgs_context_create_real64() as they are linked
 
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
@@ -208,10 +209,16 @@ CONTENTS, search for the tag
 
 #define SSDGS_VERSION 300 /* 0.3.0; written into files */
 
+#if defined(__GNUC__) && !defined(__TINYC__) && \
+    !defined(__PCC__) /* these say they are, without what it has */
+#define SSDGS__GNUC __GNUC__
+#else
+#define SSDGS__GNUC 0
+#endif
 #ifndef SSDGS_API
 #if !defined(SSDGS_STATIC)
 #define SSDGS_API extern
-#elif defined(__GNUC__) && !defined(__TINYC__)
+#elif SSDGS__GNUC
 #define SSDGS_API static __attribute__((unused))
 #else
 #define SSDGS_API static
@@ -224,6 +231,7 @@ extern "C" {
 
 #ifdef SSDGS_REAL64 /* for tests of values and gradients */
 typedef double ssdgs_real;
+#define ssdgs_context_create ssdgs_context_create_real64 /* the linker tells who is built otherwise */
 #else
 typedef float ssdgs_real;
 #endif
@@ -502,13 +510,20 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
 /* A camera of an engine's matrices, (4,4) each: clip = projection x view x point. flags: SSDGS_COLUMN_MAJOR
    where their columns lie one after the other, as in OpenGL, SSDGS_CLIP_Y_DOWN where clip y points down, as
    in Vulkan. Off-centre is fine, and so is any range of depths, reversed or infinite: it is not read. In a
-   left-handed world the view mirrors: scenes alone take it, with models placed by a reflection. Set
-   near_plane after that. ERR_ARGUMENT: view is no rotation and translation, projection no perspective, or
-   there is no such flag. */
-enum { SSDGS_COLUMN_MAJOR = 1, SSDGS_CLIP_Y_DOWN = 2 };
+   left-handed world the view mirrors: scenes alone take it, with models placed by a reflection. Without one
+   these are seen in a mirror. Set near_plane after that. ERR_ARGUMENT: view is no rotation and translation,
+   projection no perspective, or there is no such flag. */
+enum { SSDGS_COLUMN_MAJOR = 1, SSDGS_CLIP_Y_DOWN = 2, SSDGS_CLIP_Z_FROM_0 = 4 };
 SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const ssdgs_real view[16],
                                                   const ssdgs_real projection[16], int flags, int width,
                                                   int height, ssdgs_camera *out);
+/* image.scene_depth (height,width) of an engine's depth buffer, floats within 0 .. 1 as this projection made
+   them: also reversed, infinite, with an oblique near plane. flags: as above, and SSDGS_CLIP_Z_FROM_0 where
+   clip z runs from 0, as in Direct3D, Vulkan and Metal, not from -1, as in OpenGL. pitch: bytes from row to
+   row, negative where `buffer` is the top row of one stored bottom row first, as glReadPixels() gives it. */
+SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssdgs_real projection[16],
+                                               int flags, const float *buffer, ptrdiff_t pitch, int width,
+                                               int height, ssdgs_real *depth);
 
 /* ---- render ---- */
 
@@ -1170,14 +1185,14 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #endif
 #endif
 #pragma STDC FP_CONTRACT OFF
-#elif defined(__GNUC__) && !defined(__TINYC__)
+#elif SSDGS__GNUC
 #pragma GCC push_options
 #pragma GCC optimize("fp-contract=off", "no-fast-math")
 #elif defined(_MSC_VER)
 #pragma fp_contract(off)
 #endif
 
-#if (defined(__GNUC__) || defined(__clang__)) && !defined(__TINYC__)
+#if SSDGS__GNUC || defined(__clang__)
 #define SSDGS__INLINE inline __attribute__((always_inline))
 #define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
 #define SSDGS__PREFETCH(p) __builtin_prefetch(p)
@@ -1221,7 +1236,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #if defined(__clang__)
 #define SSDGS__SMALL_BEGIN _Pragma("clang attribute push(__attribute__((minsize)), apply_to = function)")
 #define SSDGS__SMALL_END _Pragma("clang attribute pop")
-#elif defined(__GNUC__) && __GNUC__ >= 8 && !defined(__TINYC__) && defined(__OPTIMIZE__)
+#elif SSDGS__GNUC >= 8 && defined(__OPTIMIZE__)
 #define SSDGS__SMALL_BEGIN _Pragma("GCC push_options") _Pragma("GCC optimize(\"Os\")")
 #define SSDGS__SMALL_END _Pragma("GCC pop_options")
 #else
@@ -1236,7 +1251,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__ISA_AVX512 5
 #define SSDGS__ISA_NEON 6
 
-#if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && !defined(__TINYC__)
+#if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && (SSDGS__GNUC || defined(_MSC_VER))
 /* Not _M_IX86: Microsoft's compiler of 32 bits takes three vectors by value at most. */
 #if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__)) && (defined(__GNUC__) || defined(_MSC_VER))
 #if defined(__MINGW32__) && !defined(__clang__) && !defined(__OPTIMIZE__)
@@ -1587,7 +1602,7 @@ static const ssdgs_real ssdgs__window[11] = {
     (ssdgs_real)0.007598758135239185, (ssdgs_real)0.00102838008447911};
 
 static SSDGS__INLINE int ssdgs__lowest_bit(uint64_t mask) {
-#if defined(__GNUC__) && !defined(__TINYC__)
+#if SSDGS__GNUC
     return __builtin_ctzll(mask);
 #else
     int bit = 0;
@@ -1598,7 +1613,7 @@ static SSDGS__INLINE int ssdgs__lowest_bit(uint64_t mask) {
 }
 
 static SSDGS__INLINE int ssdgs__highest_bit(uint64_t mask) { /* of 0: 0 */
-#if defined(__GNUC__) && !defined(__TINYC__)
+#if SSDGS__GNUC
     return 63 ^ __builtin_clzll(mask | 1);
 #else
     int bit = 0;
@@ -1674,7 +1689,11 @@ static int ssdgs__finite(ssdgs_real x) {
 #undef VM
 #undef F
 #define SSDGS__ISA SSDGS__ISA_SCALAR
+#ifdef __PCC__ /* cannot include what a macro names */
+#include "ssdgs.h"
+#else
 #include SSDGS_SELF
+#endif
 #undef SSDGS__ISA
 #if SSDGS__X86 >= 1
 #define SSDGS__ISA SSDGS__ISA_SSE2
@@ -1715,7 +1734,7 @@ static int ssdgs__finite(ssdgs_real x) {
 
 /* Values that several threads read and write. Compilers without atomic operations neither wait for a value
    nor exclude each other. */
-#if defined(__GNUC__) && !defined(__TINYC__)
+#if SSDGS__GNUC
 #define SSDGS__GLANCE(p) __atomic_load_n(p, __ATOMIC_ACQUIRE)
 #define SSDGS__PUBLISH(p, value) __atomic_store_n(p, value, __ATOMIC_RELEASE)
 #define SSDGS__PUBLISH_TEXT(p, text) SSDGS__PUBLISH(p, text)
@@ -3478,6 +3497,33 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
     return SSDGS_OK;
 }
 
+/* An engine's matrix, row after row. */
+static ssdgs_result ssdgs__engine_matrix(ssdgs_context *context, const ssdgs_real *from, int flags,
+                                         const char *name, double to[16]) {
+    SSDGS__REFUSE(flags & ~(SSDGS_COLUMN_MAJOR | SSDGS_CLIP_Y_DOWN | SSDGS_CLIP_Z_FROM_0),
+                  "camera: flags = %d", flags);
+    for (int i = 0; i < 16; i++) {
+        const ssdgs_real value = from[flags & SSDGS_COLUMN_MAJOR ? i % 4 * 4 + i / 4 : i];
+        to[i] = (double)value;
+        if (!ssdgs__finite(value))
+            return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: row %d, column %d of %s is not finite",
+                               i / 4, i % 4, name);
+    }
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__projection_matrix(ssdgs_context *context, const ssdgs_real *from, int flags,
+                                             double p[16]) {
+    SSDGS__TRY(ssdgs__engine_matrix(context, from, flags, "projection", p));
+    SSDGS__REFUSE(p[14] == 0 || fabs(p[12]) + fabs(p[13]) + fabs(p[15]) > 1e-6 * fabs(p[14]),
+                  "camera: the last row of projection is not 0 0 +-1 0: it is no perspective, or its "
+                  "elements are in the other order");
+    SSDGS__REFUSE(p[0] == 0 || p[5] == 0 || fabs(p[1]) + fabs(p[3]) > 1e-6 * fabs(p[0]) ||
+                      fabs(p[4]) + fabs(p[7]) > 1e-6 * fabs(p[5]),
+                  "camera: projection shears, shifts or is flat");
+    return SSDGS_OK;
+}
+
 static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ssdgs_real *view,
                                                 const ssdgs_real *projection, int flags, int width,
                                                 int height, ssdgs_camera *out) {
@@ -3487,24 +3533,11 @@ static ssdgs_result ssdgs__camera_from_matrices(ssdgs_context *context, const ss
                            !view         ? "view"
                            : !projection ? "projection"
                                          : "out");
-    for (int i = 0; i < 16; i++) {
-        const int from = flags & SSDGS_COLUMN_MAJOR ? i % 4 * 4 + i / 4 : i;
-        v[i] = (double)view[from];
-        p[i] = (double)projection[from];
-        if (!ssdgs__finite(view[from]) || !ssdgs__finite(projection[from]))
-            return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
-                               "camera: row %d, column %d of view or projection is not finite", i / 4, i % 4);
-    }
-    SSDGS__REFUSE(flags & ~(SSDGS_COLUMN_MAJOR | SSDGS_CLIP_Y_DOWN), "camera: flags = %d", flags);
+    SSDGS__TRY(ssdgs__engine_matrix(context, view, flags, "view", v));
     SSDGS__REFUSE(fabs(v[12]) + fabs(v[13]) + fabs(v[14]) > 1e-6 || fabs(v[15] - 1) > 1e-6,
                   "camera: the last row of view is not 0 0 0 1: is it the other order of elements?");
+    SSDGS__TRY(ssdgs__projection_matrix(context, projection, flags, p));
     const double w = p[14], size = fabs(w);
-    SSDGS__REFUSE(!(size > 0) || fabs(p[12]) + fabs(p[13]) + fabs(p[15]) > 1e-6 * size,
-                  "camera: the last row of projection is not 0 0 +-1 0: it is no perspective, or its "
-                  "elements are in the other order");
-    SSDGS__REFUSE(p[0] == 0 || p[5] == 0 || fabs(p[1]) + fabs(p[3]) > 1e-6 * fabs(p[0]) ||
-                      fabs(p[4]) + fabs(p[7]) > 1e-6 * fabs(p[5]),
-                  "camera: projection shears, shifts or is flat");
     const double down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
     const double sign[3] = {p[0] > 0 ? 1.0 : -1.0, p[5] * down > 0 ? 1.0 : -1.0, w > 0 ? 1.0 : -1.0};
     ssdgs_camera camera;
@@ -3526,6 +3559,65 @@ SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const 
                                                   int height, ssdgs_camera *out) {
     SSDGS__GUARD(context, context, "ssdgs_camera_from_matrices",
                  ssdgs__camera_from_matrices(context, view, projection, flags, width, height, out));
+}
+
+/* depth = scale / (z - a x - b y - c), with clip z of the buffer's value and the pixel's column and row. */
+typedef struct ssdgs__depth_job {
+    double scale, a, b, c;
+    const float *buffer;
+    ptrdiff_t pitch;
+    int width, height, from_0;
+    ssdgs_real *depth;
+} ssdgs__depth_job;
+
+/* Sixteen rows. */
+static void ssdgs__depth_task(void *data, int index) {
+    const ssdgs__depth_job *job = (const ssdgs__depth_job *)data;
+    for (int y = 16 * index; y < 16 * index + 16 && y < job->height; y++) {
+        const char *row = (const char *)job->buffer + y * job->pitch;
+        ssdgs_real *to = job->depth + (size_t)y * (size_t)job->width;
+        for (int x = 0; x < job->width; x++) {
+            float value;
+            memcpy(&value, row + (size_t)x * sizeof value, sizeof value);
+            const double z = job->from_0 ? (double)value : 2 * (double)value - 1;
+            to[x] = (ssdgs_real)(job->scale / (z - (job->a * x + job->b * y + job->c)));
+        }
+    }
+}
+
+SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssdgs_real projection[16],
+                                               int flags, const float *buffer, ptrdiff_t pitch, int width,
+                                               int height, ssdgs_real *depth) {
+    double p[16];
+    SSDGS__BEGIN(context, context, "ssdgs_depth_from_buffer");
+    ssdgs_result result = !projection || !buffer || !depth
+                              ? ssdgs__null(context, "ssdgs_depth_from_buffer",
+                                            !projection ? "projection"
+                                            : !buffer   ? "buffer"
+                                                        : "depth")
+                              : ssdgs__projection_matrix(context, projection, flags, p);
+    if (!result && (p[11] == 0 || width < 1 || height < 1))
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
+                             "depth buffer: %d x %d pixels, row 2, column 3 of projection is %g", width,
+                             height, p[11]);
+    if (result) return ssdgs__leave(context, result);
+    /* clip z = p8 x + p9 y + p10 z + p11, where clip x = p0 x + p2 z = (2 (column + 1/2) / width - 1) w, y
+     * alike */
+    const double by_x = p[8] / p[0], by_y = p[9] / p[5], down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
+    ssdgs__depth_job job;
+    job.scale = p[11] / fabs(p[14]);
+    job.a = by_x * 2 / width;
+    job.b = by_y * 2 / height * down;
+    job.c = by_x * (1.0 / width - 1 - p[2] / p[14]) + by_y * (down * (1.0 / height - 1) - p[6] / p[14]) +
+            p[10] / p[14];
+    job.buffer = buffer;
+    job.pitch = pitch;
+    job.width = width;
+    job.height = height;
+    job.from_0 = flags & SSDGS_CLIP_Z_FROM_0;
+    job.depth = depth;
+    ssdgs__parallel(context, (height - 1) / 16 + 1, ssdgs__depth_task, &job);
+    return ssdgs__leave(context, SSDGS_OK);
 }
 
 SSDGS__SMALL_END
@@ -8689,7 +8781,10 @@ static int ssdgs__ply_line(ssdgs__ply *ply, ssdgs__ply_token tokens[6]) {
     }
     ply->at = p + 1;
     ply->line++;
-    while (count < 6 && (tokens[count] = ssdgs__ply_cut(&line, p)).length) count++;
+    for (; count < 6; count++) { /* pcc 1.2.0 makes no member of an assignment's value */
+        tokens[count] = ssdgs__ply_cut(&line, p);
+        if (!tokens[count].length) break;
+    }
     return count;
 }
 
@@ -11938,7 +12033,7 @@ SSDGS__SMALL_END
 #if __clang_major__ < 12 || !SSDGS__X86
 #pragma STDC FP_CONTRACT DEFAULT
 #endif
-#elif defined(__GNUC__) && !defined(__TINYC__)
+#elif SSDGS__GNUC
 #pragma GCC pop_options
 #endif
 #endif /* SSDGS_IMPLEMENTATION */

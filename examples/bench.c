@@ -298,7 +298,7 @@ static void kernel_task(void *data, int task) {
     if (job->work == PEAK_RATE) sink = (double)job->peak(job->repeat);
     else
         for (long r = 0; r < job->repeat; r++) switch (job->work) {
-            case FORWARD: ssdgs__network_forward(k, &net, n->lists, n->inputs, n->outputs); break;
+            case FORWARD: ssdgs__network_forward(k, &net, NULL, n->lists, n->inputs, n->outputs); break;
             case BACKWARD:
                 memcpy(n->d, n->output_gradient, (size_t)n->sizes[n->layers] * SSDGS__BLOCK * sizeof *n->d);
                 ssdgs__network_backward(k, &net, n->inputs, n->outputs, &backward, n->lists, n->sizes[0],

@@ -24,7 +24,7 @@ enum {
     AMBIENT,
     SKY,
     ANIMATION,
-    SIZE,
+    SIDE,
     TRAJECTORY, /* it and those after it take no value */
     COMPONENTS,
     FIT,
@@ -148,8 +148,8 @@ static int parse(job *j, int argc, char **argv) {
     if (!j->dataset || !j->out || !j->out[0]) return usage("needs MODEL.ply, DATASET and", "--out DIR");
     if (j->given[TRAJECTORY] && (j->given[SPLIT] || j->given[FIT]))
         return usage("--trajectory has no photographs, so it takes no", j->given[FIT] ? "--fit" : "--split");
-    if (!j->given[TRAJECTORY] && (j->given[ANIMATION] || j->given[SIZE]))
-        return usage("--trajectory is needed for", j->given[SIZE] ? "--size" : "--animation");
+    if (!j->given[TRAJECTORY] && (j->given[ANIMATION] || j->given[SIDE]))
+        return usage("--trajectory is needed for", j->given[SIDE] ? "--size" : "--animation");
     if (j->given[SKY] && (j->given[FIT] || j->given[AMBIENT] || j->given[ANIMATION]))
         return usage("--sky is all the light there is, and stands still, so it takes no",
                      j->given[FIT]       ? "--fit"
@@ -163,7 +163,7 @@ static int parse(job *j, int argc, char **argv) {
     if (value && !strcmp(value, "white")) j->background[0] = j->background[1] = j->background[2] = 1;
     else if (value && strcmp(value, "black")) return usage("no such background:", value);
     if (parse_number(j, THREADS, 0, 1024, &j->desc.threads) ||
-        parse_number(j, REDUCE, 1, 1000000000, &j->reduce) || parse_number(j, SIZE, 1, 4096, &j->size))
+        parse_number(j, REDUCE, 1, 1000000000, &j->reduce) || parse_number(j, SIDE, 1, 4096, &j->size))
         return 2;
     value = j->given[AMBIENT];
     j->ambient = value ? strtod(value, &end) : 1;

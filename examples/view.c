@@ -22,7 +22,7 @@ static void end(int number) {
 static char program[] = "view";
 
 /* What a model is, and what reading it mended. */
-static void tell(const char *name, const ssdgs_model *model, const ssdgs_load_stats *read) {
+static void tell_of(const char *name, const ssdgs_model *model, const ssdgs_load_stats *read) {
     const int mended = read->zero_rotations + read->clamped_opacities + read->clamped_scales;
     fprintf(stderr, "view: %s: %d Gaussians", name, ssdgs_model_count(model));
     if (read->dropped || mended) fprintf(stderr, ", %d dropped, %d mended", read->dropped, mended);
@@ -69,7 +69,7 @@ int main(int argc, char **argv) {
     for (int i = 0; i < s.show.count && !result && !failed; i++) {
         ssdgs_load_stats read;
         failed = splats_load(s.show.context, s.show.names[i], s.show.models + i, &read, error);
-        if (!failed) tell(s.show.names[i], s.show.models[i], &read);
+        if (!failed) tell_of(s.show.names[i], s.show.models[i], &read);
     }
     if (!result && !failed) result = view_arrange(&s.show);
     if (!result && !failed && !*page && view_page(__FILE__, argv[0], page, sizeof page, error)) failed = 1;

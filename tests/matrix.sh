@@ -55,6 +55,7 @@ for standard in c++11 c++14 c++17 c++20; do
 done
 group=machines
 row tcc '' "$most" tcc ''
+row pcc '' 't_golden t_ply' pcc ''
 row musl '' "$few" 'musl-gcc -static' -O2
 row i686 '' "$few" 'i686-linux-gnu-gcc -static' -O2
 # t_olat asks POSIX for more; mingw names its programs *.exe, and they end their lines with \r\n

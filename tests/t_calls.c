@@ -130,7 +130,7 @@ static void call_everything(void) {
     ssdgs_model *model = all.model, *other = NULL;
     ssdgs_trainer *trainer = all.trainer, *next = NULL;
     ssdgs_photo copy;
-    make_pixels();
+    const float floats[1] = {0};
     const ssdgs_object object = ssdgs_object_default(model);
     ssdgs_gaussian gaussian = ssdgs_gaussian_default();
     const ssdgs_real rough[2] = {(ssdgs_real)0.3, (ssdgs_real)0.3};
@@ -139,10 +139,12 @@ static void call_everything(void) {
     int iteration, done = 0;
     if (all.depth || !context || !model) return; /* the log hears none of what follows */
     all.depth = 1;
+    make_pixels();
     memcpy(&copy, &photo, sizeof copy);
     IGNORED(ssdgs_context_trim, context);
     REFUSED(ssdgs_context_run, context, 1, count_task, &done);
     REFUSED(ssdgs_camera_from_matrices, context, matrix, matrix, 0, 4, 4, &copy.camera);
+    REFUSED(ssdgs_depth_from_buffer, context, matrix, 0, floats, 4, 1, 1, matrix);
     REFUSED(ssdgs_compare, context, color, color, 4, 4, &metrics);
     REFUSED(ssdgs_checkpoint_iteration, context, FILE_NAME, &iteration);
     REFUSED(ssdgs_render_ex, model, &photo.camera, &photo.light, 1, NULL, &image, NULL);

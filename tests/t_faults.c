@@ -9,10 +9,7 @@
 #include <limits.h>
 #include <stdarg.h>
 #include <sys/stat.h>
-#ifdef _WIN32
-#include <direct.h>
-#define MAKE_FOLDER(path) _mkdir(path)
-#else
+#ifndef _WIN32
 #include <dirent.h>
 #include <errno.h>
 #include <fcntl.h>
@@ -23,7 +20,6 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
-#define MAKE_FOLDER(path) mkdir(path, 0777)
 
 /* ---- a disk that fails on demand: the system calls of both headers come through here ---- */
 

@@ -1093,7 +1093,7 @@ static void test_datasets(void) {
         {"{\"fl_x\":3,\"k1\":0.1,\"frames\":[" FRAME "]}", "k1: distorted"}};
     unsigned char pixels[6 * 4 * 3];
     for (size_t i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)i;
-    mkdir(FOLDER "/b", 0777);
+    MAKE_FOLDER(FOLDER "/b");
     CHECK(!olat_write_png(FOLDER "/a.png", 6, 4, 3, pixels, error) &&
           !olat_write_png(FOLDER "/b/c.png", 3, 2, 1, pixels, error));
     write_text(FOLDER "/broken.png", "this is no image");
@@ -3134,7 +3134,7 @@ static void test_twins(void) {
     static const char *const refined[VIEWS] = {"\"R_opt\":[[1,0,0],[0,-1,0],[0,0,-1]],\"T_opt\":[-0.5,0,4]",
                                                "\"R_opt\":[[0,0,-1],[1,0,0],[0,-1,0]],\"T_opt\":[0.5,2,3]"};
     const double focal = 0.5 * (double)SIDE / tan(0.4);
-    mkdir(FOLDER "/twin", 0777);
+    MAKE_FOLDER(FOLDER "/twin");
     char text[3][4000], *at[3] = {text[0], text[1], text[2]}, name[200];
 #define SAY(k, ...) (at[k] += snprintf(at[k], (size_t)(text[k] + sizeof text[k] - at[k]), __VA_ARGS__))
     SAY(0, "{\"camera_angle_x\":0.8,\"camera_near\":0.1,\"camera_far\":9,\"frames\":[");
@@ -3249,7 +3249,7 @@ static void test_twins(void) {
         if (made < k) break;
     }
     remove(FOLDER "/exclude_list.txt");
-    mkdir(FOLDER "/exclude_list.txt", 0777);
+    MAKE_FOLDER(FOLDER "/exclude_list.txt");
     CHECK(load_fails(text[2], 0, "exclude_list.txt"));
     rmdir(FOLDER "/exclude_list.txt");
     CHECK(load_fails("{\"frames\":[{\"light_positions\":[[1,2,3],4]," POSE
@@ -3421,7 +3421,7 @@ static void test_guard(void) {
                                         "out/old.png", "in/set.json", "in/bad.json"};
     static const char *const outputs[] = {GUARD "/out/new.png", GUARD "/out/old.png", GUARD "/later/new.png",
                                           GUARD "/later/b/new.png"};
-    mkdir(GUARD, 0777), mkdir(GUARD "/in", 0777), mkdir(GUARD "/out", 0777);
+    MAKE_FOLDER(GUARD), MAKE_FOLDER(GUARD "/in"), MAKE_FOLDER(GUARD "/out");
     char path[600];
     for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
         snprintf(path, sizeof path, GUARD "/%s", names[i]);
@@ -3738,9 +3738,9 @@ static void test_primaries(void) {
 }
 
 int main(void) {
-    mkdir("build", 0777);
-    mkdir(FOLDER, 0777);
-    mkdir(FOLDER "/dir.png", 0777);
+    MAKE_FOLDER("build");
+    MAKE_FOLDER(FOLDER);
+    MAKE_FOLDER(FOLDER "/dir.png");
     TEST_ROW("70", "PNG of every kind", (test_kinds(), test_dynamic()));
     TEST_ROW("74", "every byte of a PNG changed, every truncation", test_damage());
     TEST_ROW("75", "streams that deflate forbids", test_streams());

@@ -1274,6 +1274,35 @@ static void test_matrices(void) {
         CHECK(got.width == 80 && got.height == 50 && got.near_plane == 0);
         CHECK_NEAR(got.view, want.view, 12, 1e-6, 0, "view");
         CHECK_NEAR(&got.fx, &want.fx, 4, 1e-4, 0, "fx, fy, cx, cy");
+        /* depth buffers that such projections make, oblique ones, too, are depths again; one row upwards */
+        static float buffer[80 * 50];
+        static ssdgs_real depth[80 * 50];
+        const int oblique = kind % 3 == 0, upwards = kind % 5 == 0;
+        double worst = 0;
+        for (int i = 0; i < 80 * 50; i++) {
+            const double d = i % 7 ? 0.2 + 40 * draw((uint64_t)i) : f;
+            const double at[2] = {(i % 80 + 0.5 - (double)want.cx) * d / (double)want.fx,
+                                  (i / 80 + 0.5 - (double)want.cy) * d / (double)want.fy};
+            double z = (a * s * d + b) / d;
+            for (int c = 0; c < 2 && oblique; c++) z += (c ? -0.02 : 0.03) * axis[c] * at[c] / d;
+            buffer[(upwards ? 49 - i / 80 : i / 80) * 80 + i % 80] = (float)(gl ? (z + 1) / 2 : z);
+        }
+        for (int c = 0; c < 2 && oblique; c++)
+            p[column_major ? 4 * c + 2 : 8 + c] = (ssdgs_real)(3 * (c ? -0.02 : 0.03));
+        CHECK(!ssdgs_depth_from_buffer(
+            context, p, flags | (gl ? 0 : SSDGS_CLIP_Z_FROM_0), buffer + (upwards ? 49 * 80 : 0),
+            upwards ? -80 * (int)sizeof *buffer : 80 * (int)sizeof *buffer, 80, 50, depth));
+        for (int i = 0; i < 80 * 50; i++) { /* floats near 1 tell depths of 40 to 5e-4 */
+            const double d = i % 7 ? 0.2 + 40 * draw((uint64_t)i) : f;
+            const double off = fabs((double)depth[i] / d - 1) / (1e-5 + 2e-5 * d);
+            if (d > 1e29) CHECK(!(depth[i] > 0 && depth[i] < 1e4f));
+            else worst = off > worst ? off : worst;
+        }
+        if (!CHECK(worst < 1)) printf("    kind %d: %g\n", kind, worst);
+        CHECK(ssdgs_depth_from_buffer(context, p, 8, buffer, 320, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, 320, 0, 50, depth) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_depth_from_buffer(context, p, 0, NULL, 320, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
+        for (int c = 0; c < 2; c++) p[column_major ? 4 * c + 2 : 8 + c] = 0;
         /* the same camera from a world whose x is turned round: left-handed */
         for (int i = 0; i < 3; i++) v[column_major ? i : 4 * i] *= -1;
         CHECK(!ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got));
@@ -1288,7 +1317,7 @@ static void test_matrices(void) {
             CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
             *in = kept;
         }
-        CHECK(ssdgs_camera_from_matrices(context, v, p, flags | 4, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_camera_from_matrices(context, v, p, flags | 8, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
         v[0] *= 2;
         CHECK(ssdgs_camera_from_matrices(context, v, p, flags, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
         v[0] = (ssdgs_real)NAN;

@@ -8,6 +8,13 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifdef _WIN32
+#include <direct.h>
+#define MAKE_FOLDER(path) _mkdir(path)
+#else
+#include <sys/stat.h>
+#define MAKE_FOLDER(path) mkdir(path, 0777)
+#endif
 
 static int test_passed, test_failed;
 

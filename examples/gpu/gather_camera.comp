@@ -16,7 +16,8 @@ shared uint first;
 void main() {
     uint blended = 0u, needed = 0u, sum;
     if (256u * group() >= count) return;
-    pair of = item() < count ? of_gaussian[item()] : pair(0u, 0u);
+    pair of = pair(0u, 0u);
+    if (item() < count) of = of_gaussian[item()]; /* glslang's SPIR-V of ?: with structures is invalid */
     for (uint i = of.first; i < of.first + of.second; i++) {
         uint at = instance[i].first;
         blended |= tile_seen[at];
