@@ -245,7 +245,7 @@ typedef float ssdgs_real;
     X(ERR_IO, "a file could not be read or written") \
     X(ERR_FORMAT, "a file does not hold what it should") \
     X(ERR_LIMIT, "a size is over its limit") \
-    X(ERR_CANCELLED, "cancelled by the progress callback") \
+    X(ERR_CANCELLED, "cancelled by a callback") \
     X(ERR_NONFINITE, "a value is not finite") \
     X(ERR_ISA, "this CPU or build lacks the instruction set asked for")
 
@@ -453,10 +453,14 @@ typedef struct ssdgs_load_stats { /* what reading a file mended */
 } ssdgs_load_stats;
 
 #ifndef SSDGS_NO_STDIO
-/* One PLY file. Saving replaces it only once all is written. Loading sorts Gaussians that are in no order.
-   stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving ERR_NONFINITE where networks or ASG
-   are not finite. */
+/* One PLY file; paths are UTF-8 on Windows, too. Saving replaces it only once all is written. Loading sorts
+   Gaussians that are in no order. stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving
+   ERR_NONFINITE where networks or ASG are not finite. */
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
+/* The bytes of that file, some after others, to who takes them, on this thread: an archive, memory. take
+   returns 0; else that ends it with ERR_CANCELLED. */
+SSDGS_API ssdgs_result ssdgs_model_write(const ssdgs_model *model,
+                                         int (*take)(void *user, const void *bytes, size_t size), void *user);
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
                                         ssdgs_load_stats *stats);
 #endif
@@ -9368,10 +9372,23 @@ SSDGS_API ssdgs_result ssdgs_model_load_memory(ssdgs_context *context, const voi
 
 #ifndef SSDGS_NO_STDIO
 
+#ifdef _WIN32
+enum { SSDGS__PATH = 4096 };
+
+/* A path of UTF-8 for Windows; where it is none, as of its code page. Too long ones become empty. */
+static const wchar_t *ssdgs__wide(const char *path, wchar_t to[SSDGS__PATH]) {
+    if (!MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, to, SSDGS__PATH) &&
+        !MultiByteToWideChar(CP_ACP, 0, path, -1, to, SSDGS__PATH))
+        to[0] = 0;
+    return to;
+}
+#endif
+
 /* Folders, devices and pipes are neither read, which might never end, nor replaced. */
 static int ssdgs__irregular(const char *path) {
 #ifdef _WIN32
-    const DWORD kind = GetFileAttributesA(path);
+    wchar_t wide[SSDGS__PATH];
+    const DWORD kind = GetFileAttributesW(ssdgs__wide(path, wide));
     return kind != INVALID_FILE_ATTRIBUTES && (kind & (FILE_ATTRIBUTE_DIRECTORY | FILE_ATTRIBUTE_DEVICE));
 #else
     struct stat info;
@@ -9390,7 +9407,12 @@ static ssdgs_result ssdgs__read_file(ssdgs_context *context, const char *path, s
     *bytes = NULL;
     *size = 0;
     if (ssdgs__irregular(path)) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
+#ifdef _WIN32
+    wchar_t wide[SSDGS__PATH];
+    FILE *file = _wfopen(ssdgs__wide(path, wide), L"rb");
+#else
     FILE *file = fopen(path, "rb");
+#endif
     if (!file) return ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be opened (errno %d)", path, errno);
     const long hint = fseek(file, 0, SEEK_END) == 0 ? ftell(file) : 0;
     rewind(file);
@@ -9435,14 +9457,31 @@ SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path
 /* ---- writing ---- */
 
 #ifdef _WIN32
-#define SSDGS__OPEN_NEW(path) _open(path, _O_WRONLY | _O_CREAT | _O_EXCL | _O_BINARY, _S_IREAD | _S_IWRITE)
 #define SSDGS__WRITE(file, bytes, size) _write(file, bytes, (unsigned)(size))
 #define SSDGS__SYNC(file) _commit(file)
 #define SSDGS__CLOSE(file) _close(file)
-#define SSDGS__UNLINK(path) _unlink(path)
-#define SSDGS__RENAME(from, to) \
-    (MoveFileExA(from, to, MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH) ? 0 : -1)
+#define SSDGS__OPEN_NEW(path) ssdgs__open_new(path)
+#define SSDGS__UNLINK(path) ssdgs__unlink(path)
+#define SSDGS__RENAME(from, to) ssdgs__rename(from, to)
 #define SSDGS__PROCESS() ((unsigned long)_getpid())
+
+static int ssdgs__open_new(const char *path) {
+    wchar_t wide[SSDGS__PATH];
+    return _wopen(ssdgs__wide(path, wide), _O_WRONLY | _O_CREAT | _O_EXCL | _O_BINARY, _S_IREAD | _S_IWRITE);
+}
+
+static void ssdgs__unlink(const char *path) {
+    wchar_t wide[SSDGS__PATH];
+    (void)_wunlink(ssdgs__wide(path, wide));
+}
+
+static int ssdgs__rename(const char *from, const char *to) {
+    wchar_t wide[2][SSDGS__PATH];
+    return MoveFileExW(ssdgs__wide(from, wide[0]), ssdgs__wide(to, wide[1]),
+                       MOVEFILE_REPLACE_EXISTING | MOVEFILE_WRITE_THROUGH)
+               ? 0
+               : -1;
+}
 #else
 #define SSDGS__OPEN_NEW(path) open(path, O_WRONLY | O_CREAT | O_EXCL, 0666)
 #define SSDGS__WRITE(file, bytes, size) write(file, bytes, size)
@@ -9455,9 +9494,12 @@ SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path
 
 enum { SSDGS__WRITER_BUFFER = 65536, SSDGS__WRITER_SUFFIX = 64 };
 
-/* A file that gets its name only when it is complete. The first failure sticks; close reports it. */
+/* A file that gets its name only when it is complete, or somebody who takes its bytes. The first failure
+   sticks; close reports it. */
 typedef struct ssdgs__writer {
     ssdgs_context *context;
+    int (*take)(void *user, const void *bytes, size_t size); /* NULL: a file */
+    void *user;
     const char *path; /* the caller's, until close */
     char *temporary;  /* the file's name before; the buffer follows it */
     unsigned char *buffer;
@@ -9466,17 +9508,20 @@ typedef struct ssdgs__writer {
     ssdgs_result result;
 } ssdgs__writer;
 
-static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *context, const char *path) {
+static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *context, const char *path,
+                                       int (*take)(void *, const void *, size_t), void *user) {
     const size_t room = strlen(path) + SSDGS__WRITER_SUFFIX;
     memset(writer, 0, sizeof *writer);
     writer->context = context;
     writer->path = path;
     writer->file = -1;
-    if (ssdgs__irregular(path))
+    writer->take = take;
+    writer->user = user;
+    if (!take && ssdgs__irregular(path))
         return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is not a regular file", path);
 #ifndef _WIN32 /* where replacing it is refused */
     struct stat old;
-    const int replaces = stat(path, &old) == 0;
+    const int replaces = !take && stat(path, &old) == 0;
     if (replaces && access(path, W_OK))
         return writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: is write-protected", path);
 #endif
@@ -9484,13 +9529,13 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
     if (!writer->temporary) return writer->result = SSDGS_ERR_MEMORY;
     writer->buffer = (unsigned char *)writer->temporary + room;
     errno = EEXIST;
-    for (int attempt = 0; attempt < 100 && writer->file < 0 && errno == EEXIST;
+    for (int attempt = 0; !take && attempt < 100 && writer->file < 0 && errno == EEXIST;
          attempt++) { /* a crash may have left that name */
         snprintf(writer->temporary, room, "%s.tmp.%lx.%lx.%d", path, SSDGS__PROCESS(),
                  (unsigned long)(size_t)context, attempt);
         writer->file = SSDGS__OPEN_NEW(writer->temporary);
     }
-    if (writer->file < 0)
+    if (!take && writer->file < 0)
         writer->result = ssdgs__fail(context, SSDGS_ERR_IO, "%s: cannot be created (errno %d)", path, errno);
 #ifndef _WIN32
     if (writer->file >= 0 && replaces) chmod(writer->temporary, old.st_mode & 0777); /* stays private */
@@ -9499,7 +9544,10 @@ static ssdgs_result ssdgs__writer_open(ssdgs__writer *writer, ssdgs_context *con
 }
 
 static void ssdgs__writer_flush(ssdgs__writer *writer) {
-    size_t done = 0;
+    size_t done = writer->take ? writer->used : 0;
+    if (done && !writer->result && writer->take(writer->user, writer->buffer, done))
+        writer->result =
+            ssdgs__fail(writer->context, SSDGS_ERR_CANCELLED, "%s: its bytes were not taken", writer->path);
     while (!writer->result && done < writer->used) {
         const ptrdiff_t wrote =
             (ptrdiff_t)SSDGS__WRITE(writer->file, writer->buffer + done, writer->used - done);
@@ -9524,8 +9572,8 @@ static void ssdgs__writer_put(ssdgs__writer *writer, const void *bytes, size_t s
 }
 
 static ssdgs_result ssdgs__writer_close(ssdgs__writer *writer) {
+    if (writer->file >= 0 || writer->take) ssdgs__writer_flush(writer);
     if (writer->file >= 0) {
-        ssdgs__writer_flush(writer);
         int failed = 0;
         while (!writer->result && !failed && SSDGS__SYNC(writer->file) != 0 && errno != EINVAL)
             failed = errno != EINTR; /* EINVAL: some file systems cannot */
@@ -9624,12 +9672,12 @@ static ssdgs_result ssdgs__savable(const ssdgs_model *model, const char *path) {
     return result;
 }
 
-static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path) {
-    if (!path) return ssdgs__null(model->context, "ssdgs_model_save", "path");
+static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path,
+                                      int (*take)(void *, const void *, size_t), void *user) {
     const ssdgs_result result = ssdgs__savable(model, path);
     if (result) return result;
     ssdgs__writer writer;
-    ssdgs__writer_open(&writer, model->context, path);
+    ssdgs__writer_open(&writer, model->context, path, take, user);
     ssdgs__writer_text(&writer, "ply\nformat binary_little_endian 1.0\n");
     size_t rows[SSDGS__PLY_KINDS];
     ssdgs__ply_cursor cursor;
@@ -9654,7 +9702,17 @@ static ssdgs_result ssdgs__model_save(const ssdgs_model *model, const char *path
 }
 
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path) {
-    SSDGS__GUARD(model, model->context, "ssdgs_model_save", ssdgs__model_save(model, path));
+    SSDGS__GUARD(model, model->context, "ssdgs_model_save",
+                 path ? ssdgs__model_save(model, path, NULL, NULL)
+                      : ssdgs__null(model->context, "ssdgs_model_save", "path"));
+}
+
+SSDGS_API ssdgs_result ssdgs_model_write(const ssdgs_model *model,
+                                         int (*take)(void *user, const void *bytes, size_t size),
+                                         void *user) {
+    SSDGS__GUARD(model, model->context, "ssdgs_model_write",
+                 take ? ssdgs__model_save(model, "model", take, user)
+                      : ssdgs__null(model->context, "ssdgs_model_write", "take"));
 }
 #endif /* SSDGS_NO_STDIO */
 
@@ -11845,7 +11903,7 @@ static ssdgs_result ssdgs__trainer_save(const ssdgs_trainer *trainer, const char
     ssdgs__checkpoint_photo *const photos = ssdgs__checkpoint_photos(trainer);
     if (!photos) return SSDGS_ERR_MEMORY;
     ssdgs__writer writer;
-    ssdgs__writer_open(&writer, trainer->context, path);
+    ssdgs__writer_open(&writer, trainer->context, path, NULL, NULL);
     ssdgs__checkpoint_head head;
     ssdgs__checkpoint_describe(trainer, &head);
     ssdgs__checkpoint_io io = {&writer, NULL, SSDGS__FOLD_START};

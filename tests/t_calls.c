@@ -85,6 +85,7 @@ static ssdgs_result render_scene(int objects) {
                               NULL, &image, NULL);
 }
 
+static int take_none(void *user, const void *bytes, size_t size) { return !user && bytes && size; }
 static void count_task(void *data, int index) { ((int *)data)[index]++; }
 static void count_high(void *data, int index) {
     if (!CHECK(index >= 0)) exit(1); /* there would be no end */
@@ -152,6 +153,7 @@ static void call_everything(void) {
     REFUSED(ssdgs_render, model, &photo.camera, &photo.light, 1, &image);
     REFUSED(ssdgs_model_load_memory, context, "ply", 3, &other, NULL);
     REFUSED(ssdgs_model_load, context, FILE_NAME, &other, NULL);
+    REFUSED(ssdgs_model_write, model, take_none, NULL);
     REFUSED(ssdgs_model_save, model, FILE_NAME);
     REFUSED(ssdgs_model_set, model, 0, &gaussian);
     REFUSED(ssdgs_model_get, model, 0, &gaussian);

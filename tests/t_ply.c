@@ -308,8 +308,10 @@ static bytes emit(const document *d, const variant *v) {
 
 #ifdef SSDGS_REAL64
 #define FILES_AS "build/t_ply_64"
+#define FILES_AS_WIDE L"build/t_ply_64"
 #else
 #define FILES_AS "build/t_ply"
+#define FILES_AS_WIDE L"build/t_ply"
 #endif
 static const char path[] = FILES_AS ".ply";
 
@@ -1641,7 +1643,7 @@ static void test_disk(void) {
                   strstr(ssdgs_error_message(context), "is write-protected"));
         chmod(path, 0600);
         CHECK(ssdgs_model_save(old, path) == SSDGS_OK);
-        mkdir(FILES_AS ".folder", 0777);
+        MAKE_FOLDER(FILES_AS ".folder");
         CHECK(ssdgs_model_save(model, FILES_AS ".folder") == SSDGS_ERR_IO); /* the rename fails */
         rmdir(FILES_AS ".folder");
         signal(SIGXFSZ, SIG_IGN); /* a disk that is full after 100,000 bytes */
@@ -1783,13 +1785,60 @@ static void test_look(void) {
     }
 }
 
+typedef struct taken {
+    unsigned char *bytes;
+    size_t size, most; /* most: refuses from so many on */
+    int calls;
+} taken;
+
+static int take(void *user, const void *piece, size_t size) {
+    taken *t = (taken *)user;
+    t->calls++;
+    if (t->size + size > t->most) return 1;
+    t->bytes = (unsigned char *)realloc(t->bytes, t->size + size);
+    memcpy(t->bytes + t->size, piece, size);
+    t->size += size;
+    return 0;
+}
+
+/* A model written to who takes its bytes: those of its file, whose name may be any. Who refuses some gets no
+   more. */
+static void test_taken(void) {
+    ssdgs_context *home = NULL;
+    ssdgs_model *model = NULL, *again = NULL;
+    taken all = {NULL, 0, (size_t)-1, 0}, few = {NULL, 0, 100000, 0};
+    const char *const name = FILES_AS "\xc3\xa9\xe6\xbc\xa2"; /* e with an acute, and a Chinese character */
+    unsigned char *file = NULL;
+    size_t size = 0;
+    CHECK(!ssdgs_context_create(NULL, &home) && !ssdgs_model_create(home, NULL, 700, &model));
+    CHECK(!ssdgs_model_save(model, name));
+    CHECK(!ssdgs__read_file(home, name, 0, &file, &size));
+#ifdef _WIN32
+    CHECK(GetFileAttributesW(FILES_AS_WIDE L"\x00e9\x6f22") != INVALID_FILE_ATTRIBUTES);
+#endif
+    CHECK(!ssdgs_model_write(model, take, &all) && all.calls > 2);
+    CHECK(all.size == size && !memcmp(all.bytes, file, size));
+    CHECK(!ssdgs_model_load_memory(home, all.bytes, all.size, &again, NULL));
+    CHECK(ssdgs_model_count(again) == 700);
+    CHECK(ssdgs_model_write(model, take, &few) == SSDGS_ERR_CANCELLED);
+    CHECK(few.calls == 2 && few.size < 100000 &&
+          !strcmp(ssdgs_error_message(home), "model: its bytes were not taken"));
+    CHECK(ssdgs_model_write(model, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+    ssdgs__release(home, file);
+    free(all.bytes), free(few.bytes);
+    (void)SSDGS__UNLINK(name);
+    ssdgs_model_destroy(model), ssdgs_model_destroy(again);
+    ssdgs_context_destroy(home);
+}
+
 int main(void) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.threads = 1;
     TEST_METER(desc, &memory);
 #ifndef _WIN32
-    mkdir("build", 0777);
+    MAKE_FOLDER("build");
+    test_taken();
 #endif
     if (ssdgs_context_create(&desc, &context) != SSDGS_OK) return 1;
     test_round_trip();

@@ -543,6 +543,7 @@ static void test_missing(void) {
     MISSING(ssdgs_model_sort(NULL));
     MISSING(ssdgs_model_save(NULL, "build/none"));
     MISSING(ssdgs_model_save(model, NULL));
+    MISSING(ssdgs_model_write(model, NULL, NULL));
     MISSING(ssdgs_render(NULL, &camera, &light, 1, &image));
     MISSING(ssdgs_render(model, NULL, &light, 1, &image));
     MISSING(ssdgs_render(model, &camera, &light, 1, NULL));
