@@ -125,10 +125,14 @@ SCENES, as engines have them: examples/engine.c is one
   each other. Scattered light stays within an object. A frame:
       ssdgs_camera_from_matrices()   the engine's view and projection
       ssdgs_scene_light()            the lights' maps
-      draw the meshes, with shadows of splats by ssdgs_scene_shadow()
-      ssdgs_scene_render()           with the meshes' depth as image.scene_depth, their shadows on splats
-                                     by ssdgs_scene_occlude()
-      ssdgs_blend_pixels()           over the engine's framebuffer
+      draw the meshes, with shadows of splats by ssdgs_scene_shadow(), or in a shader by
+                                     ssdgs_scene_light_map()
+      ssdgs_scene_render()           with the meshes' depth as image.scene_depth, which
+                                     ssdgs_depth_from_buffer() makes, their shadows on splats by
+                                     ssdgs_scene_occlude()
+      ssdgs_blend_pixels()           over the engine's framebuffer; or ssdgs_to_pixels() and the GPU's
+                                     blending, best of SSDGS_RGBA16F + SSDGS_PREMULTIPLIED
+  For a wanted irradiance E at a distance d from a point light, intensity is E d^2 / light_scale.
   A light's map covers what it reaches, with up to 1024 pixels a side by default. So give lights a range: they
   cost what they reach, and keep their maps while they and what they reach stay, dark or not. A directional
   light's map covers all objects of the array: leave out what is far away.
@@ -164,9 +168,9 @@ MACROS, defined before the header; those with * in every file that includes it
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
   unbake.h models that take light of plain splats, splats.h reads packed ones, adopt.h mends edited models,
-  olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3. Nothing finds cameras or
-  lights (options.refine corrects small errors), traces light between objects, undistorts lenses, or
-  compresses models.
+  olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3, on a thread that has no
+  OpenGL context of its own. Nothing finds cameras or lights (options.refine corrects small errors), traces
+  light between objects, undistorts lenses, or compresses models.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
@@ -672,6 +676,26 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
    failed. */
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction);
+/* The same map for an engine's shader, which has at each pixel three distances from the light, a.xyz, where
+   the way through splats darkens; a.w and b.xyz say what is left between them, b.w behind them. In GLSL, with
+   a map's two textures and its members as uniforms, between four pixels and weighted by fract(): vec3 p =
+   vec3(dot(view[0], vec4(at, 1)), dot(view[1], vec4(at, 1)), dot(view[2], vec4(at, 1))); vec2 pixel = focal *
+   p.xy / (parallel ? 1 : p.z) + size / 2 - 0.5;  (outside of 0 .. size - 1: 1) float d = (parallel ? p.z :
+   length(p)) * (1 - 1e-6) - bias; float left(vec4 a, vec4 b, float d) { bool past = d > a.y; float from =
+   past ? a.y : a.x, to = past ? a.z : a.y, dark = past ? b.x : a.w; float begin = max(to - bias, from), rise
+   = ((past ? b.z : b.y) - dark) * (d - begin) / (to - begin); return d <= a.x ? 1 : d > a.z ? b.w : d > begin
+   ? dark + rise : dark;
+       } */
+typedef struct ssdgs_light_map {
+    int faces, size; /* 0: nothing is in the way; 1; 6: a cube's, along +-x, +-y, +-z, of which the one ahead
+                        of a place knows it; pixels a side */
+    int parallel;    /* 1: distances are along z, not from the light */
+    ssdgs_real view[6][12]; /* (3,4) of each face, world to x right, y down, z forward */
+    ssdgs_real focal, bias; /* px; how far behind a place its own surface may be */
+} ssdgs_light_map;
+/* a, b: (faces, size, size, 4) floats; NULL: map alone. Errors as of ssdgs_scene_shadow(). */
+SSDGS_API ssdgs_result ssdgs_scene_light_map(ssdgs_scene *scene, int light, ssdgs_light_map *map, float *a,
+                                             float *b);
 
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
@@ -7954,18 +7978,27 @@ static void ssdgs__shadow_task(void *data, int chunk) {
     }
 }
 
-static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
-                                        ssdgs_real *fraction) {
+/* A light's views with maps, from *view up to *end. */
+static ssdgs_result ssdgs__mapped_views(const ssdgs_scene *scene, int light, const ssdgs_splat_view **view,
+                                        const ssdgs_splat_view **end) {
     ssdgs_context *context = scene->context;
     const ssdgs__frame_memory *m = scene->frame;
-    SSDGS__REFUSE(count < 0 || (count && (!points || !fraction)),
-                  count < 0 ? "%d points" : "%d points, but an array is NULL", count);
     SSDGS__REFUSE(!m || light < 0 || light >= m->mapped,
                   "light %d: ssdgs_scene_light() has made no map of it", light);
     const ssdgs__light_memory *own = (const ssdgs__light_memory *)m->lights.memory + light;
-    const ssdgs_splat_view *view = (const ssdgs_splat_view *)m->views.memory + own->first,
-                           *end = view + (own->wanted ? own->views : 0);
-    ssdgs__shadow_job job = {context->k, view, end, points, fraction, m->bias, count};
+    *view = (const ssdgs_splat_view *)m->views.memory + own->first;
+    *end = *view + (own->wanted ? own->views : 0);
+    return SSDGS_OK;
+}
+
+static ssdgs_result ssdgs__scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
+                                        ssdgs_real *fraction) {
+    ssdgs_context *context = scene->context;
+    const ssdgs_splat_view *view, *end;
+    SSDGS__REFUSE(count < 0 || (count && (!points || !fraction)),
+                  count < 0 ? "%d points" : "%d points, but an array is NULL", count);
+    SSDGS__TRY(ssdgs__mapped_views(scene, light, &view, &end));
+    ssdgs__shadow_job job = {context->k, view, end, points, fraction, scene->frame->bias, count};
     ssdgs__parallel(context, ssdgs__chunks(count), ssdgs__shadow_task, &job);
     return SSDGS_OK;
 }
@@ -7974,6 +8007,59 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
                                           ssdgs_real *fraction) {
     SSDGS__GUARD(scene, scene->context, "ssdgs_scene_shadow",
                  ssdgs__scene_shadow(scene, light, points, count, fraction));
+}
+
+typedef struct ssdgs__map_job {
+    const ssdgs_splat_view *view;
+    float *a, *b;
+} ssdgs__map_job;
+
+/* A row of tiles of a face. */
+static void ssdgs__map_task(void *data, int index) {
+    const ssdgs__map_job *job = (const ssdgs__map_job *)data;
+    const int rows = job->view->tiles_y, size = job->view->width;
+    const ssdgs_splat_view *v = job->view + index / rows;
+    for (int y = index % rows * 16; y < index % rows * 16 + 16; y++)
+        for (int x = 0; x < size; x++) {
+            const uint32_t tile = v->map_tile[index % rows * v->tiles_x + x / 16];
+            const int at = (y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3);
+            const size_t to =
+                4 * (((size_t)(index / rows) * (size_t)size + (size_t)y) * (size_t)size + (size_t)x);
+            ssdgs_light_pixel open = {{SSDGS__NEVER, SSDGS__NEVER, SSDGS__NEVER}, {0, 0}, {0, 0}, 0};
+            if (tile != UINT32_MAX) open = v->light_map[(size_t)tile * 256 + (size_t)at];
+            for (int i = 0; i < 3; i++)
+                job->a[to + (size_t)i] =
+                    (float)(open.distance[i] < SSDGS__NEVER ? open.distance[i] + v->nearest : SSDGS__NEVER);
+            job->a[to + 3] = (float)open.left[0];
+            job->b[to] = (float)open.left[1];
+            for (int i = 0; i < 2; i++) job->b[to + 1 + (size_t)i] = (float)open.before[i];
+            job->b[to + 3] = (float)open.behind;
+        }
+}
+
+static ssdgs_result ssdgs__scene_light_map(ssdgs_scene *scene, int light, ssdgs_light_map *map, float *a,
+                                           float *b) {
+    ssdgs_context *context = scene->context;
+    const ssdgs_splat_view *view, *end;
+    SSDGS__REFUSE(!map || !a != !b, "light's map: %s is NULL", map ? a ? "b" : "a" : "map");
+    memset(map, 0, sizeof *map);
+    SSDGS__TRY(ssdgs__mapped_views(scene, light, &view, &end));
+    map->bias = scene->frame->bias;
+    for (; view + map->faces < end && view[map->faces].light_map; map->faces++)
+        memcpy(map->view[map->faces], view[map->faces].view, sizeof map->view[0]);
+    if (!map->faces) return SSDGS_OK;
+    map->size = view->width;
+    map->parallel = view->orthographic;
+    map->focal = view->fx;
+    ssdgs__map_job job = {view, a, b};
+    if (a) ssdgs__parallel(context, map->faces * view->tiles_y, ssdgs__map_task, &job);
+    return SSDGS_OK;
+}
+
+SSDGS_API ssdgs_result ssdgs_scene_light_map(ssdgs_scene *scene, int light, ssdgs_light_map *map, float *a,
+                                             float *b) {
+    SSDGS__GUARD(scene, scene->context, "ssdgs_scene_light_map",
+                 ssdgs__scene_light_map(scene, light, map, a, b));
 }
 
 /* ---- light from all around ---- */

@@ -167,6 +167,8 @@ static void call_everything(void) {
     REFUSED(ssdgs_scene_create, context, &stage);
     REFUSED(ssdgs_scene_render, scene, &object, 1, &photo.camera, &photo.light, 1, NULL, &image, NULL);
     REFUSED(ssdgs_scene_light, scene, &object, 1, &photo.camera, &photo.light, 1, NULL);
+    ssdgs_light_map light_map;
+    REFUSED(ssdgs_scene_light_map, scene, 0, &light_map, NULL, NULL);
     REFUSED(ssdgs_scene_shadow, scene, 0, gaussian.position, 1, low);
     IGNORED(ssdgs_scene_occlude, scene, NULL);
     REFUSED(ssdgs_trainer_create, model, &photo, 1, NULL, &next);

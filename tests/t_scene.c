@@ -1238,6 +1238,86 @@ static void test_look_at(void) {
     }
 }
 
+/* A light's map as a shader reads it, by the lines that ssdgs.h has for it. */
+static double shader_left(const float a[4], const float b[4], double d, double bias) {
+    const int past = d > (double)a[1];
+    const double from = (double)(past ? a[1] : a[0]), to = (double)(past ? a[2] : a[1]),
+                 dark = (double)(past ? b[0] : a[3]), begin = to - bias > from ? to - bias : from,
+                 rise = ((double)(past ? b[2] : b[1]) - dark) * (d - begin) / (to - begin);
+    return d <= (double)a[0] ? 1 : d > (double)a[2] ? (double)b[3] : d > begin ? dark + rise : dark;
+}
+
+static double shader_passed(const ssdgs_light_map *map, const float *a, const float *b,
+                            const ssdgs_real at[3]) {
+    for (int face = 0; face < map->faces; face++) {
+        double p[3], pixel[2], length = 0, sum = 0;
+        for (int i = 0; i < 3; i++) {
+            const ssdgs_real *row = map->view[face] + 4 * i;
+            p[i] = (double)row[0] * (double)at[0] + (double)row[1] * (double)at[1] +
+                   (double)row[2] * (double)at[2] + (double)row[3];
+            length += p[i] * p[i];
+        }
+        for (int c = 0; c < 2; c++)
+            pixel[c] = (double)map->focal * p[c] / (map->parallel ? 1 : p[2]) + map->size / 2.0 - 0.5;
+        if (!(p[2] > 0) || !(pixel[0] >= 0 && pixel[0] <= map->size - 1) ||
+            !(pixel[1] >= 0 && pixel[1] <= map->size - 1))
+            continue;
+        const double d = (map->parallel ? p[2] : sqrt(length)) * (1 - 1e-6) - (double)map->bias;
+        const int x = (int)fmin(floor(pixel[0]), map->size - 2),
+                  y = (int)fmin(floor(pixel[1]), map->size - 2);
+        for (int i = 0; i < 4; i++) {
+            const double u = pixel[0] - x, w = pixel[1] - y;
+            const size_t from =
+                4 * (((size_t)(face * map->size + y + i / 2)) * (size_t)map->size + (size_t)(x + i % 2));
+            sum += (i % 2 ? u : 1 - u) * (i / 2 ? w : 1 - w) *
+                   shader_left(a + from, b + from, d, (double)map->bias);
+        }
+        return sum;
+    }
+    return 1;
+}
+
+static void test_shader_maps(void) {
+    enum { POINTS = 3000 };
+    static ssdgs_real points[3 * POINTS], fraction[POINTS];
+    ssdgs_settings s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 300, 0.4);
+    ssdgs_object object[2] = {ssdgs_object_default(model), ssdgs_object_default(model)};
+    object[1].to_world[3] = 2;
+    ssdgs_light lights[6];
+    const ssdgs_real one[3] = {1, 1, 1}, down[3] = {0, (ssdgs_real)0.6, (ssdgs_real)-0.8};
+    lights[0] = point_light(0.5, -3, 2); /* outside */
+    lights[1] = point_light(1, 0, 0);    /* between them: six faces */
+    lights[2] = ssdgs_light_directional(down, one);
+    lights[3] = point_light(3000, -9000, 9000); /* seen as a parallel one */
+    lights[4] = ssdgs_light_spot(lights[0].position, down, one, (ssdgs_real)0.2, (ssdgs_real)0.3);
+    lights[5] = lights[0], lights[5].unshadowed = 1;
+    ssdgs_light_map map;
+    CHECK(ssdgs_scene_light_map(scene, 0, NULL, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(!ssdgs_scene_light(scene, object, 2, NULL, lights, 6, NULL));
+    CHECK(ssdgs_scene_light_map(scene, 6, &map, NULL, NULL) == SSDGS_ERR_ARGUMENT);
+    for (int light = 0; light < 6; light++) {
+        CHECK(!ssdgs_scene_light_map(scene, light, &map, NULL, NULL));
+        CHECK(map.faces == (light == 1 ? 6 : light < 5) && map.parallel == (light == 2 || light == 3));
+        const size_t size = 4 * (size_t)map.faces * (size_t)map.size * (size_t)map.size;
+        float *a = (float *)malloc((size + 1) * sizeof *a), *b = (float *)malloc((size + 1) * sizeof *b);
+        CHECK(ssdgs_scene_light_map(scene, light, &map, a, NULL) == SSDGS_ERR_ARGUMENT);
+        CHECK(!ssdgs_scene_light_map(scene, light, &map, a, b));
+        for (int i = 0; i < 3 * POINTS; i++)
+            points[i] = (ssdgs_real)(3 * draw(900 + (uint64_t)i) - (i % 3 ? 1.5 : 0.5));
+        CHECK(!ssdgs_scene_shadow(scene, light, points, POINTS, fraction));
+        int off = 0, dark = 0;
+        for (int i = 0; i < POINTS; i++) { /* where it falls a rounding tells */
+            off += fabs(shader_passed(&map, a, b, points + 3 * i) - (double)fraction[i]) > 1e-3;
+            dark += fraction[i] < (ssdgs_real)0.9;
+        }
+        if (!CHECK(off < POINTS / 300)) printf("    light %d: %d of %d\n", light, off, POINTS);
+        CHECK(light == 5 ? !dark : dark > POINTS / 50);
+        free(a), free(b);
+    }
+    ssdgs_model_destroy(model);
+}
+
 /* Engines' matrices, made from a camera by their books, give the camera back: right-handed and looking along
    -z, left-handed and along z, rows or columns, any range of depths, y up or down. */
 static void test_matrices(void) {
@@ -2203,6 +2283,7 @@ int main(void) {
     test_bounds();
     test_look_at();
     test_light_kinds();
+    test_shader_maps();
     test_matrices();
     test_left_handed();
     test_missed();
