@@ -1022,6 +1022,75 @@ static void measure_scenes(bench *b) {
     print_table(t);
 }
 
+static int count_bytes(void *sum, const void *bytes, size_t size) {
+    (void)bytes;
+    *(size_t *)sum += size;
+    return 0;
+}
+
+/* What an engine asks for beside frames, each at 1280x720 where it is of pixels: one object that covers
+   little of them. */
+static void measure_engine(bench *b) {
+    enum { W = 1280, H = 720, CALLS = 8 };
+    static const char *const names[CALLS] = {"frame, nothing in sight",     "frame, few pixels covered",
+                                             "depth of an engine's buffer", "sRGB bytes",
+                                             "premultiplied halves",        "blended over sRGB bytes",
+                                             "a light's map for a shader",  "model to memory"};
+    const size_t pixels = (size_t)W * H;
+    table *t = new_table(b, "engine", "ms");
+    session s;
+    open_session(b, &s, 0, b->threads[0], 0, NULL);
+    ssdgs_scene *scene = NULL;
+    check(s.context, ssdgs_scene_create(s.context, &scene));
+    ssdgs_object object = ssdgs_object_default(s.model);
+    ssdgs_real *color = (ssdgs_real *)calloc(pixels * 5, sizeof *color), low[3], high[3];
+    ssdgs_image image = {0, color, color + 3 * pixels, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    float *depth = (float *)calloc(pixels, sizeof *depth), *map[2];
+    void *bytes = malloc(8 * pixels);
+    if (!color || !depth || !bytes) die("engine", "out of memory");
+    check(s.context, ssdgs_model_bounds(s.model, low, high));
+    const ssdgs_real away = 6 * (high[0] - low[0]), eye[3] = {0, -away, away / 2}, up[3] = {0, 0, 1};
+    const ssdgs_real perspective[16] = {1, 0, 0, 0, 0, 2, 0, 0, 0, 0, -1, (ssdgs_real)-0.1, 0, 0, -1, 0};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, low, up, (ssdgs_real)0.9, W, H);
+    const ssdgs_light light = b->photos[0].light;
+    ssdgs_light_map shape;
+    check(s.context, ssdgs_scene_light(scene, &object, 1, NULL, &light, 1, NULL));
+    check(s.context, ssdgs_scene_light_map(scene, 0, &shape, NULL, NULL));
+    const size_t texels = 4 * (size_t)shape.faces * (size_t)shape.size * (size_t)shape.size;
+    map[0] = (float *)malloc((2 * texels + 1) * sizeof **map);
+    if (!map[0]) die("engine", "out of memory");
+    map[1] = map[0] + texels;
+    for (int call = 0; call < CALLS; call++) {
+        double best = 1e30;
+        object.to_world[3] = call ? 0 : 100 * away;
+        for (int i = 0; i < (b->quick ? 3 : 10); i++) {
+            const int format = call == 4 ? SSDGS_RGBA16F + SSDGS_PREMULTIPLIED : SSDGS_RGBA8;
+            size_t sum = 0;
+            const double start = olat_seconds();
+            if (call < 2)
+                check(s.context,
+                      ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, NULL, &image, NULL));
+            else if (call == 2)
+                check(s.context, ssdgs_depth_from_buffer(s.context, perspective, 0, depth, 4 * W, W, H,
+                                                         color + 4 * pixels));
+            else if (call < 5)
+                ssdgs_to_pixels(s.context, &image, W, H, SSDGS_TRANSFER_SRGB, format, bytes,
+                                (call - 2) * 4 * W);
+            else if (call == 5)
+                ssdgs_blend_pixels(s.context, &image, W, H, SSDGS_TRANSFER_SRGB, SSDGS_RGBA8, bytes, 4 * W);
+            else if (call == 6) check(s.context, ssdgs_scene_light_map(scene, 0, &shape, map[0], map[1]));
+            else check(s.context, ssdgs_model_write(s.model, count_bytes, &sum));
+            const double ms = 1e3 * (olat_seconds() - start);
+            if (ms < best) best = ms;
+        }
+        add_row(t, names[call], best);
+    }
+    print_table(t);
+    free(color), free(depth), free(bytes), free(map[0]);
+    ssdgs_scene_destroy(scene);
+    close_session(&s);
+}
+
 /* Density control, every hundredth iteration, is left out: the number of Gaussians stays the model's. */
 static void measure_training(bench *b) {
     table *t = new_table(b, "training", "iterations ms_1_thread ms_all_threads hours_all_threads");
@@ -1083,6 +1152,7 @@ static void measure_model(bench *b, const char *prefix, const char *path) {
     measure_skipping(b);
     measure_scaling(b);
     measure_scenes(b);
+    measure_engine(b);
     measure_training(b);
 }
 

@@ -17,7 +17,8 @@ typedef struct level {
     int width, height;
     float view[16], projection[16]; /* columns one after the other */
     unsigned char *pixels;          /* (h,w,4) sRGB */
-    float *depth, *normal, *albedo, *world, *lit, *passed;
+    float *buffer;                  /* OpenGL's depth, 0 .. 1 */
+    float *normal, *albedo, *world, *lit, *passed;
     ssdgs_camera camera;
     ssdgs_light lights[LIGHTS];
     ssdgs_object objects[OBJECTS];
@@ -29,7 +30,7 @@ typedef struct level {
     ssdgs_real low[2][3], high[2][3];   /* their bounds */
     ssdgs_scene *scene;
     ssdgs_render_stats stats; /* of the last frame */
-    float *color, *alpha;
+    float *color, *alpha, *depth;
 } level;
 
 static void perspective(float fov_y, float aspect, float near_plane, float out[16]) { /* infinitely far */
@@ -60,7 +61,7 @@ static void look_at(const float eye[3], const float target[3], float out[16]) { 
     out[15] = 1;
 }
 
-/* A triangle into the z-buffer, which holds the depth along the view: its pixels' place, normal, colour. */
+/* A triangle into the depth buffer, and its pixels' place, normal, colour. */
 static void triangle(level *l, float corner[3][3], const float normal[3], const float albedo[3]) {
     float x[3], y[3], w[3];
     for (int i = 0; i < 3; i++) {
@@ -90,8 +91,9 @@ static void triangle(level *l, float corner[3][3], const float normal[3], const 
             if (b[0] < 0 || b[1] < 0 || b[2] < 0) continue;
             const float depth = 1 / (b[0] / w[0] + b[1] / w[1] + b[2] / w[2]);
             const int pixel = py * l->width + px;
-            if (depth >= l->depth[pixel]) continue;
-            l->depth[pixel] = depth;
+            const float value = 0.5f + 0.5f * (l->projection[14] / depth - l->projection[10]);
+            if (value >= l->buffer[pixel]) continue;
+            l->buffer[pixel] = value;
             for (int c = 0; c < 3; c++) {
                 l->world[3 * pixel + c] = depth * (b[0] * corner[0][c] / w[0] + b[1] * corner[1][c] / w[1] +
                                                    b[2] * corner[2][c] / w[2]);
@@ -114,7 +116,7 @@ static void draw_meshes(level *l) {
     const float up[3] = {0, 0, 1}, dark[3] = {0.22f, 0.22f, 0.24f}, light[3] = {0.5f, 0.48f, 0.45f},
                 red[3] = {0.6f, 0.14f, 0.08f};
     for (int i = 0; i < l->width * l->height; i++) {
-        l->depth[i] = INFINITY;
+        l->buffer[i] = 1;
         memset(l->albedo + 3 * i, 0, 3 * sizeof *l->albedo);
     }
     for (int i = 0; i < TILES * TILES; i++) { /* the floor, a chessboard */
@@ -191,7 +193,7 @@ static ssdgs_result shade_meshes(level *l) {
         if (result) return result;
         for (int i = 0; i < pixels; i++) {
             const float *at = l->world + 3 * i;
-            if (!(l->depth[i] < INFINITY) || box_hides(l, light, at)) continue;
+            if (!(l->buffer[i] < 1) || box_hides(l, light, at)) continue;
             const float e = irradiance(l, light, at, l->normal + 3 * i) * l->passed[i] / 3.14159265f;
             for (int c = 0; c < 3; c++)
                 l->lit[3 * i + c] += l->albedo[3 * i + c] * e * l->lights[light].intensity[c];
@@ -296,6 +298,10 @@ static ssdgs_result draw_frame(level *l, float t) {
         result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options);
     if (!result) draw_meshes(l);
     if (!result) result = shade_meshes(l);
+    if (!result)
+        result =
+            ssdgs_depth_from_buffer(l->context, l->projection, SSDGS_COLUMN_MAJOR, l->buffer,
+                                    (ptrdiff_t)sizeof *l->buffer * l->width, l->width, l->height, l->depth);
     if (!result)
         result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options,
                                     &image, &l->stats);
@@ -417,13 +423,13 @@ int main(int argc, char **argv) {
         return 2;
     }
     const size_t pixels = (size_t)l.width * (size_t)l.height;
-    float *planes = (float *)calloc(pixels * 18, sizeof *planes);
+    float *planes = (float *)calloc(pixels * 19, sizeof *planes);
     unsigned char *sheet = (unsigned char *)calloc(pixels * SHEET * SHEET, 4);
     l.pixels = (unsigned char *)malloc(pixels * 4);
     l.depth = planes, l.alpha = planes + pixels, l.passed = planes + 2 * pixels,
     l.normal = planes + 3 * pixels;
     l.albedo = planes + 6 * pixels, l.world = planes + 9 * pixels, l.lit = planes + 12 * pixels;
-    l.color = planes + 15 * pixels;
+    l.color = planes + 15 * pixels, l.buffer = planes + 18 * pixels;
     failed = !planes || !sheet || !l.pixels;
     if (failed) fprintf(stderr, "out of memory\n");
     ssdgs_result result = failed ? SSDGS_OK : open_level(&l, models);
