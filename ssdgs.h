@@ -213,8 +213,7 @@ CONTENTS, search for the tag
 
 #define SSDGS_VERSION 300 /* 0.3.0; written into files */
 
-#if defined(__GNUC__) && !defined(__TINYC__) && \
-    !defined(__PCC__) /* these say they are, without what it has */
+#if defined(__GNUC__) && !defined(__TINYC__) && !defined(__PCC__) /* which say GCC without having it all */
 #define SSDGS__GNUC __GNUC__
 #else
 #define SSDGS__GNUC 0
@@ -677,15 +676,19 @@ SSDGS_API ssdgs_result ssdgs_scene_light(ssdgs_scene *scene, const ssdgs_object 
 SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const ssdgs_real *points, int count,
                                           ssdgs_real *fraction);
 /* The same map for an engine's shader, which has at each pixel three distances from the light, a.xyz, where
-   the way through splats darkens; a.w and b.xyz say what is left between them, b.w behind them. In GLSL, with
-   a map's two textures and its members as uniforms, between four pixels and weighted by fract(): vec3 p =
-   vec3(dot(view[0], vec4(at, 1)), dot(view[1], vec4(at, 1)), dot(view[2], vec4(at, 1))); vec2 pixel = focal *
-   p.xy / (parallel ? 1 : p.z) + size / 2 - 0.5;  (outside of 0 .. size - 1: 1) float d = (parallel ? p.z :
-   length(p)) * (1 - 1e-6) - bias; float left(vec4 a, vec4 b, float d) { bool past = d > a.y; float from =
-   past ? a.y : a.x, to = past ? a.z : a.y, dark = past ? b.x : a.w; float begin = max(to - bias, from), rise
-   = ((past ? b.z : b.y) - dark) * (d - begin) / (to - begin); return d <= a.x ? 1 : d > a.z ? b.w : d > begin
-   ? dark + rise : dark;
+   the way through splats darkens; a.w and b.xyz say what is left between them, b.w behind them. */
+/* clang-format off */
+/* In GLSL, with the map's textures and members as uniforms, at four pixels, weighted as usual; outside 1:
+       vec3 p = vec3(dot(view[0], vec4(at, 1)), dot(view[1], vec4(at, 1)), dot(view[2], vec4(at, 1)));
+       vec2 pixel = focal * p.xy / (parallel ? 1 : p.z) + size / 2 - 0.5;
+       float d = (parallel ? p.z : length(p)) * (1 - 1e-6) - bias;
+       float left(vec4 a, vec4 b, float d) {
+           bool past = d > a.y;
+           float from = past ? a.y : a.x, to = past ? a.z : a.y, dark = past ? b.x : a.w;
+           float begin = max(to - bias, from), part = (d - begin) / (to - begin);
+           return d <= a.x ? 1 : d > a.z ? b.w : d > begin ? mix(dark, past ? b.z : b.y, part) : dark;
        } */
+/* clang-format on */
 typedef struct ssdgs_light_map {
     int faces, size; /* 0: nothing is in the way; 1; 6: a cube's, along +-x, +-y, +-z, of which the one ahead
                         of a place knows it; pixels a side */
@@ -1281,7 +1284,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 
 #if !defined(SSDGS_NO_SIMD) && !defined(SSDGS_REAL64) && (SSDGS__GNUC || defined(_MSC_VER))
 /* Not _M_IX86: Microsoft's compiler of 32 bits takes three vectors by value at most. */
-#if (defined(__x86_64__) || defined(_M_X64) || defined(__i386__)) && (defined(__GNUC__) || defined(_MSC_VER))
+#if defined(__x86_64__) || defined(_M_X64) || defined(__i386__)
 #if defined(__MINGW32__) && !defined(__clang__) && !defined(__OPTIMIZE__)
 #define SSDGS__X86 1 /* its 16-byte stack cannot hold spilled AVX vectors: SSE2 alone */
 #elif defined(SSDGS_NO_AVX2)
@@ -3629,8 +3632,7 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
                              "depth buffer: %d x %d pixels, row 2, column 3 of projection is %g", width,
                              height, p[11]);
     if (result) return ssdgs__leave(context, result);
-    /* clip z = p8 x + p9 y + p10 z + p11, where clip x = p0 x + p2 z = (2 (column + 1/2) / width - 1) w, y
-     * alike */
+    /* clip z = p8 x + p9 y + p10 z + p11; clip x = p0 x + p2 z = (2 (column + 1/2) / width - 1) w; y alike */
     const double by_x = p[8] / p[0], by_y = p[9] / p[5], down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
     ssdgs__depth_job job;
     job.scale = p[11] / fabs(p[14]);
@@ -7983,6 +7985,7 @@ static ssdgs_result ssdgs__mapped_views(const ssdgs_scene *scene, int light, con
                                         const ssdgs_splat_view **end) {
     ssdgs_context *context = scene->context;
     const ssdgs__frame_memory *m = scene->frame;
+    *view = *end = NULL;
     SSDGS__REFUSE(!m || light < 0 || light >= m->mapped,
                   "light %d: ssdgs_scene_light() has made no map of it", light);
     const ssdgs__light_memory *own = (const ssdgs__light_memory *)m->lights.memory + light;

@@ -1375,7 +1375,7 @@ static void test_matrices(void) {
         for (int i = 0; i < 80 * 50; i++) { /* floats near 1 tell depths of 40 to 5e-4 */
             const double d = i % 7 ? 0.2 + 40 * draw((uint64_t)i) : f;
             const double off = fabs((double)depth[i] / d - 1) / (1e-5 + 2e-5 * d);
-            if (d > 1e29) CHECK(!(depth[i] > 0 && depth[i] < 1e4f));
+            if (d > 1e29) CHECK(!(depth[i] > 0 && depth[i] < 10000));
             else worst = off > worst ? off : worst;
         }
         if (!CHECK(worst < 1)) printf("    kind %d: %g\n", kind, worst);
