@@ -1238,6 +1238,48 @@ static void test_look_at(void) {
     }
 }
 
+/* Tiles where nothing is are not blended: colour, alpha and median depth have the bits of a frame with
+   components, which blends them all, over any background, and nothing beside the picture is written. */
+static void test_empty_tiles(void) {
+    enum { W = 75, H = 53, STRIDE = 80, PLANE = STRIDE * H };
+    static ssdgs_real planes[2][8 * PLANE];
+    ssdgs_settings s = small_settings();
+    ssdgs_model *model = cloud(&s, 0, 300, 0.2);
+    const ssdgs_object object = ssdgs_object_default(model);
+    const ssdgs_light light = point_light(0.5, -3, 2);
+    const ssdgs_real eye[3] = {0, -5, 1}, at[3] = {0, 0, (ssdgs_real)0.4}, up[3] = {0, 0, 1},
+                     middle[3] = {0, 0, 0};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, at, up, (ssdgs_real)0.7, W, H),
+                       close_by = ssdgs_camera_look_at(eye, middle, up, (ssdgs_real)0.05, W, H);
+    for (int way = 0; way < 3; way++) {
+        ssdgs_render_options options = ssdgs_render_options_default();
+        for (int c = 0; c < 3 && way; c++) options.background[c] = (ssdgs_real)(way == 1 ? 0.2 * c : -1);
+        for (int all = 0; all < 2; all++) {
+            ssdgs_image image;
+            memset(&image, 0, sizeof image);
+            image.stride = STRIDE;
+            image.color = planes[all], image.alpha = planes[all] + 3 * PLANE;
+            image.median_depth = planes[all] + 4 * PLANE;
+            if (all) image.normal = planes[all] + 5 * PLANE;
+            CHECK(!ssdgs_scene_render(scene, &object, 1, &close_by, &light, 1, &options, &image, NULL));
+            CHECK(planes[all][3 * PLANE] > (ssdgs_real)0.5); /* the corner was covered */
+            for (int i = 0; i < 8 * PLANE; i++) planes[all][i] = 77;
+            CHECK(!ssdgs_scene_render(scene, &object, 1, &camera, &light, 1, &options, &image, NULL));
+        }
+        CHECK(!memcmp(planes[0], planes[1], 5 * PLANE * sizeof planes[0][0]));
+        int beside = 0, covered = 0;
+        for (int i = 0; i < 5 * PLANE; i++) {
+            const int x = (i < 3 * PLANE ? i / 3 : i) % STRIDE;
+            beside += x >= W && (planes[0][i] < 77 || planes[0][i] > 77);
+            covered += i >= 3 * PLANE && i < 4 * PLANE && x < W && planes[0][i] > 0;
+        }
+        CHECK(!beside && covered > 20 && covered < W * H / 3);
+        CHECK(planes[0][0] == options.background[0] && planes[0][1] == options.background[1] &&
+              planes[0][3 * PLANE] == 0 && planes[0][4 * PLANE] == 0);
+    }
+    ssdgs_model_destroy(model);
+}
+
 /* A light's map as a shader reads it, by the lines that ssdgs.h has for it. */
 static double shader_left(const float a[4], const float b[4], double d, double bias) {
     const int past = d > (double)a[1];
@@ -2283,6 +2325,7 @@ int main(void) {
     test_bounds();
     test_look_at();
     test_light_kinds();
+    test_empty_tiles();
     test_shader_maps();
     test_matrices();
     test_left_handed();
