@@ -4615,13 +4615,6 @@ static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int *sees) {
     return SSDGS_OK;
 }
 
-static int ssdgs__has_ambient(const ssdgs_render_options *options) {
-    int any = 0;
-    for (int i = 0; i < 27; i++)
-        any |= options->ambient[i / 3][i % 3] < 0 || options->ambient[i / 3][i % 3] > 0;
-    return any;
-}
-
 static ssdgs_result ssdgs__sky_shares_of(ssdgs_placed *o);
 
 /* ---- what earlier frames have found has a key of all that it depends on; equal keys, equal results ---- */
@@ -4785,7 +4778,12 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     m->ready = m->mapped = 0; /* again once the walks are done */
     SSDGS__TRY(
         ssdgs__place_all(frame, request->objects, request->object_count, request->lights, light_count));
-    for (int i = 0; ssdgs__has_ambient(&frame->options) && i < frame->object_count; i++)
+    int ambient = 0;
+    for (int i = 0; i < 27; i++) {
+        const ssdgs_real value = frame->options.ambient[i / 3][i % 3];
+        ambient |= value < 0 || value > 0;
+    }
+    for (int i = 0; ambient && i < frame->object_count; i++)
         SSDGS__TRY(ssdgs__sky_shares_of(frame->objects + i));
     int sees;
     SSDGS__TRY(ssdgs__find_reach(frame, &sees));
@@ -5217,6 +5215,7 @@ static ssdgs_result ssdgs__bin(ssdgs_frame *frame) {
 static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_view *v, int index,
                                   int walked) {
     ssdgs__tile t;
+    memset(&t, 0, sizeof t);
     t.record = v->record;
     t.depth = v->depth;
     t.list = v->tile_list + v->tile_start[index];
@@ -5242,10 +5241,6 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
         v->light >= 0 &&
         (v[-1].light == v->light || (v + 1 < frame->views + frame->view_count && v[1].light == v->light));
     t.of_gaussian = shared ? NULL : v->of_gaussian;
-    t.scene_depth = NULL;
-    t.material_of = NULL;
-    t.median = NULL;
-    t.material = 0;
     return t;
 }
 
@@ -6147,26 +6142,11 @@ static int ssdgs__inputs(const ssdgs_settings *s, const ssdgs__block_layout *l, 
     return n;
 }
 
-/* How many of the scattering network's inputs pass a gradient on: all before the light pass's cues, which are
-   held fixed. */
-static int ssdgs__inputs_asked(const ssdgs_settings *s, const ssdgs__block_layout *l) {
+/* The rows of the first `count` of a network's inputs. */
+static int ssdgs__input_rows(const ssdgs_settings *s, const ssdgs__block_layout *l, int shadow, int count) {
     ssdgs__input in[7];
-    const int n = ssdgs__inputs(s, l, 0, in);
-    for (int i = 0; i < n; i++)
-        if (!in[i].of_gaussian && in[i].from >= l->cue) return in[i].row;
-    return l->scattering[0];
-}
-
-/* The first of a network's inputs are the Gaussian's place and where it is seen from: several lights have
-   them in common. */
-static ssdgs__common ssdgs__common_of(const ssdgs_settings *s, const ssdgs__block_layout *l, int shadow,
-                                      int lights, ssdgs_real *sums) {
-    ssdgs__input in[7];
-    ssdgs__common common = {0, 0, sums};
-    if (lights < 2 || !(shadow ? l->shadow_layers : l->scattering_layers)) return common;
-    ssdgs__inputs(s, l, shadow, in);
-    common.rows = in[shadow ? 1 : 2].row;
-    return common;
+    const int n = ssdgs__inputs(s, l, shadow, in);
+    return n > count ? in[count].row : (shadow ? l->shadow : l->scattering)[0];
 }
 
 /* All, or those whose sums are not in `common`. */
@@ -6603,11 +6583,12 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     if (frame->layer_count) sound = k->within(scratch + l->lobe, SSDGS__LOBE * SSDGS__BLOCK, most);
     const ssdgs__network scattering_net = {l->scattering, l->scattering_layers, o->gaussians.scattering};
     const ssdgs__network shadow_net = {l->shadow, l->shadow_layers, o->gaussians.shadow};
-    ssdgs_real *sums_at = scratch + l->common;
-    ssdgs__common common[2];
-    common[0] = ssdgs__common_of(settings, l, 0, frame->light_count, sums_at);
-    common[1] =
-        ssdgs__common_of(settings, l, 1, frame->light_count, sums_at + l->scattering[1] * SSDGS__BLOCK);
+    /* several lights have in common the Gaussian's place and, but for the shadow network, where it is seen
+     * from */
+    ssdgs__common common[2] = {{0, 0, scratch + l->common},
+                               {0, 0, scratch + l->common + l->scattering[1] * SSDGS__BLOCK}};
+    if (frame->light_count > 1 && l->scattering_layers) common[0].rows = ssdgs__input_rows(settings, l, 0, 2);
+    if (frame->light_count > 1 && l->shadow_layers) common[1].rows = ssdgs__input_rows(settings, l, 1, 1);
     for (int light = 0; light < frame->light_count; light++) {
         const ssdgs__lighting *lighting = ssdgs__lightings(frame, o) + light;
         ssdgs_real *part = memory + l->lights + l->light_size * (size_t)(frame->training ? light : 0),
@@ -6969,9 +6950,11 @@ static void ssdgs__shade_backward_block(const ssdgs__shade_job *job, int block, 
         for (int s = 0; deferred && shadow && s < SSDGS__BLOCK; s++) dshadow[s] += dresidual[s];
         if (l->scattering_layers) {
             ssdgs__encode_inputs(k, settings, l, 0, NULL, gauss, part, inputs);
-            ssdgs_real *dinputs = ssdgs__network_backward(k, &scattering_net, inputs, part + l->scattering_at,
-                                                          &backward, lists, ssdgs__inputs_asked(settings, l),
-                                                          frame->frozen[0] ? NULL : slot_gradient);
+            ssdgs_real *dinputs = ssdgs__network_backward(
+                k, &scattering_net, inputs, part + l->scattering_at, &backward, lists,
+                ssdgs__input_rows(settings, l, 0,
+                                  5), /* the light pass's cues, behind these, are held fixed */
+                frame->frozen[0] ? NULL : slot_gradient);
             ssdgs__encode_inputs_backward(k, settings, l, 0, inputs, dinputs, dgauss, drows, dvisibility);
         }
         if (shadow) {
@@ -8012,50 +7995,31 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
                  ssdgs__scene_shadow(scene, light, points, count, fraction));
 }
 
-typedef struct ssdgs__map_job {
-    const ssdgs_splat_view *view;
-    float *a, *b;
-} ssdgs__map_job;
-
-/* A row of tiles of a face. */
-static void ssdgs__map_task(void *data, int index) {
-    const ssdgs__map_job *job = (const ssdgs__map_job *)data;
-    const int rows = job->view->tiles_y, size = job->view->width;
-    const ssdgs_splat_view *v = job->view + index / rows;
-    for (int y = index % rows * 16; y < index % rows * 16 + 16; y++)
-        for (int x = 0; x < size; x++) {
-            const uint32_t tile = v->map_tile[index % rows * v->tiles_x + x / 16];
-            const int at = (y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3);
-            const size_t to =
-                4 * (((size_t)(index / rows) * (size_t)size + (size_t)y) * (size_t)size + (size_t)x);
-            ssdgs_light_pixel open = {{SSDGS__NEVER, SSDGS__NEVER, SSDGS__NEVER}, {0, 0}, {0, 0}, 0};
-            if (tile != UINT32_MAX) open = v->light_map[(size_t)tile * 256 + (size_t)at];
-            for (int i = 0; i < 3; i++)
-                job->a[to + (size_t)i] =
-                    (float)(open.distance[i] < SSDGS__NEVER ? open.distance[i] + v->nearest : SSDGS__NEVER);
-            job->a[to + 3] = (float)open.left[0];
-            job->b[to] = (float)open.left[1];
-            for (int i = 0; i < 2; i++) job->b[to + 1 + (size_t)i] = (float)open.before[i];
-            job->b[to + 3] = (float)open.behind;
-        }
-}
-
 static ssdgs_result ssdgs__scene_light_map(ssdgs_scene *scene, int light, ssdgs_light_map *map, float *a,
                                            float *b) {
     ssdgs_context *context = scene->context;
-    const ssdgs_splat_view *view, *end;
+    const ssdgs_splat_view *v, *end;
     SSDGS__REFUSE(!map || !a != !b, "light's map: %s is NULL", map ? a ? "b" : "a" : "map");
     memset(map, 0, sizeof *map);
-    SSDGS__TRY(ssdgs__mapped_views(scene, light, &view, &end));
-    map->bias = scene->frame->bias;
-    for (; view + map->faces < end && view[map->faces].light_map; map->faces++)
-        memcpy(map->view[map->faces], view[map->faces].view, sizeof map->view[0]);
-    if (!map->faces) return SSDGS_OK;
-    map->size = view->width;
-    map->parallel = view->orthographic;
-    map->focal = view->fx;
-    ssdgs__map_job job = {view, a, b};
-    if (a) ssdgs__parallel(context, map->faces * view->tiles_y, ssdgs__map_task, &job);
+    SSDGS__TRY(ssdgs__mapped_views(scene, light, &v, &end));
+    for (; v < end && v->light_map; v++) {
+        map->size = v->width;
+        map->parallel = v->orthographic;
+        map->focal = v->fx;
+        map->bias = scene->frame->bias;
+        memcpy(map->view[map->faces++], v->view, sizeof v->view);
+        for (int y = 0; a && y < v->height; y++)
+            for (int x = 0; x < v->width; x++, a += 4, b += 4) {
+                const uint32_t tile = v->map_tile[y / 16 * v->tiles_x + x / 16];
+                const int at = (y & 12) << 4 | (x & 12) << 2 | (y & 3) << 2 | (x & 3);
+                ssdgs_light_pixel p = {{SSDGS__NEVER, SSDGS__NEVER, SSDGS__NEVER}, {0, 0}, {0, 0}, 0};
+                if (tile != UINT32_MAX) p = v->light_map[(size_t)tile * 256 + (size_t)at];
+                for (int i = 0; i < 3; i++) /* 1e30 stays */
+                    a[i] = (float)(p.distance[i] + v->nearest);
+                a[3] = (float)p.left[0], b[0] = (float)p.left[1], b[3] = (float)p.behind;
+                b[1] = (float)p.before[0], b[2] = (float)p.before[1];
+            }
+    }
     return SSDGS_OK;
 }
 
