@@ -460,8 +460,8 @@ typedef struct ssdgs_load_stats { /* what reading a file mended */
    Gaussians that are in no order. stats may be NULL. ERR_IO, ERR_FORMAT, ERR_LIMIT, ERR_MEMORY; on saving
    ERR_NONFINITE where networks or ASG are not finite. */
 SSDGS_API ssdgs_result ssdgs_model_save(const ssdgs_model *model, const char *path);
-/* The bytes of that file, some after others, to who takes them, on this thread: an archive, memory. take
-   returns 0; else that ends it with ERR_CANCELLED. */
+/* Hands the bytes of that file to `take`, a part at a time, on this thread: for memory, or an archive. If
+   take does not return 0, that ends it with ERR_CANCELLED. */
 SSDGS_API ssdgs_result ssdgs_model_write(const ssdgs_model *model,
                                          int (*take)(void *user, const void *bytes, size_t size), void *user);
 SSDGS_API ssdgs_result ssdgs_model_load(ssdgs_context *context, const char *path, ssdgs_model **out,
@@ -517,17 +517,18 @@ SSDGS_API ssdgs_camera ssdgs_camera_look_at(const ssdgs_real eye[3], const ssdgs
 /* A camera of an engine's matrices, (4,4) each: clip = projection x view x point. flags: SSDGS_COLUMN_MAJOR
    where their columns lie one after the other, as in OpenGL, SSDGS_CLIP_Y_DOWN where clip y points down, as
    in Vulkan. Off-centre is fine, and so is any range of depths, reversed or infinite: it is not read. In a
-   left-handed world the view mirrors: scenes alone take it, with models placed by a reflection. Without one
-   these are seen in a mirror. Set near_plane after that. ERR_ARGUMENT: view is no rotation and translation,
-   projection no perspective, or there is no such flag. */
+   left-handed world the view mirrors: scenes alone take it, with models placed by a reflection; without one
+   they look like their mirror images. Set near_plane after that. ERR_ARGUMENT: view is no rotation and
+   translation, projection no perspective, or there is no such flag. */
 enum { SSDGS_COLUMN_MAJOR = 1, SSDGS_CLIP_Y_DOWN = 2, SSDGS_CLIP_Z_FROM_0 = 4 };
 SSDGS_API ssdgs_result ssdgs_camera_from_matrices(ssdgs_context *context, const ssdgs_real view[16],
                                                   const ssdgs_real projection[16], int flags, int width,
                                                   int height, ssdgs_camera *out);
-/* image.scene_depth (height,width) of an engine's depth buffer, floats within 0 .. 1 as this projection made
-   them: also reversed, infinite, with an oblique near plane. flags: as above, and SSDGS_CLIP_Z_FROM_0 where
-   clip z runs from 0, as in Direct3D, Vulkan and Metal, not from -1, as in OpenGL. pitch: bytes from row to
-   row, negative where `buffer` is the top row of one stored bottom row first, as glReadPixels() gives it. */
+/* Makes image.scene_depth (height,width) of an engine's depth buffer: floats within 0 .. 1 that this
+   projection gave, be it reversed, infinite or of an oblique near plane. flags: as above, and
+   SSDGS_CLIP_Z_FROM_0 where clip z runs from 0, as in Direct3D, Vulkan and Metal, not from -1, as in OpenGL.
+   pitch: bytes from row to row, negative where `buffer` is the top row of one stored bottom row first, as
+   glReadPixels() gives it. Errors as above. */
 SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssdgs_real projection[16],
                                                int flags, const float *buffer, ptrdiff_t pitch, int width,
                                                int height, ssdgs_real *depth);
@@ -714,10 +715,11 @@ typedef enum ssdgs_format {
     SSDGS_PREMULTIPLIED = 16 /* may be added to a format */
 } ssdgs_format;
 /* color and alpha of a rendering without background as pixels of straight, or premultiplied, alpha; without
-   image->alpha opaque; 0 where alpha is. Bytes are encoded by transfer, halves and floats stay linear. A GPU
-   blends by light what is premultiplied and RGBA16F, or of sRGB bytes that it decodes, in a target that it
-   encodes. pitch: bytes from row to row, negative where `pixels` is the first row of an image stored bottom
-   row first. context: its threads do it; NULL, or in use by another thread: this thread alone. */
+   image->alpha opaque; 0 where alpha is. Bytes are encoded by transfer, halves and floats stay linear. For a
+   GPU to blend: premultiplied halves in a linear target, or premultiplied sRGB bytes as an sRGB texture in an
+   sRGB target. Other bytes are off at edges, by up to 74 levels. pitch: bytes from row to row, negative where
+   `pixels` is the first row of an image stored bottom row first. context: its threads do it; NULL, or in use
+   by another thread: this thread alone. */
 SSDGS_API void ssdgs_to_pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,
                                int transfer, int format, void *pixels, ptrdiff_t pitch);
 /* Lays such a rendering over a framebuffer: pixels become color + (1 - alpha) x what they hold, by light, so
