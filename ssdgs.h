@@ -147,8 +147,8 @@ SPEED
   photographs where it was measured, _fast() less than 0.1 dB, _preview() less than 0.5 dB. Time goes with
   the number of Gaussians: examples/reduce.h makes levels of detail and teaches them what the model shows. Of
   ssdgs_object.levels a frame draws what its pixels ask for.
-  A moving light costs about what the first did, less what the camera asks for. Of sixteen each casts little
-  of what is seen: options.light_detail 0.6 then leaves 61 dB to exact (one light: 51) in 0.8 of the time.
+  Each more light that moves takes about three quarters of what a frame with one takes. With sixteen,
+  options.light_detail 0.6 saves a fifth, 61 dB from exact. With one light that would be 51 dB.
   Skipped without changing any bit: Gaussians that no pixel blends, neurons that are 0 in a whole block of 64
   Gaussians, terms not asked for, results of the last frame that still hold.
 
@@ -162,8 +162,8 @@ MACROS, defined before the header; those with * in every file that includes it
   SSDGS_NO_THREADS      no threads of its own; desc.parallel still works
   SSDGS_NO_AVX512, SSDGS_NO_AVX2, SSDGS_NO_SIMD  leave these kernels out; SSDGS_SCALAR adds the scalar ones
   SSDGS_ASSERT(x)       checks an invariant: assert, for instance; nothing by default
-  SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests. A program that has it
-                        and a library that has not lack ssdgs_context_create_real64() as they are linked
+  SSDGS_REAL64 *        ssdgs_real is double, on scalar kernels and libm: for tests. Linking such a program
+                        to a library of floats fails: it lacks ssdgs_context_create_real64()
 
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
@@ -691,11 +691,13 @@ SSDGS_API ssdgs_result ssdgs_scene_shadow(ssdgs_scene *scene, int light, const s
        } */
 /* clang-format on */
 typedef struct ssdgs_light_map {
-    int faces, size; /* 0: nothing is in the way; 1; 6: a cube's, along +-x, +-y, +-z, of which the one ahead
-                        of a place knows it; pixels a side */
-    int parallel;    /* 1: distances are along z, not from the light */
+    int faces;    /* 0: nothing is in the way; 1, or 6 of a cube, where a place is looked up in the face that
+                     has it */
+    int size;     /* px, of a face's side */
+    int parallel; /* 1: distances are along z, not from the light */
     ssdgs_real view[6][12]; /* (3,4) of each face, world to x right, y down, z forward */
-    ssdgs_real focal, bias; /* px; how far behind a place its own surface may be */
+    ssdgs_real focal;       /* px */
+    ssdgs_real bias;        /* how far behind a place its own surface may be */
 } ssdgs_light_map;
 /* a, b: (faces, size, size, 4) floats; NULL: map alone. Errors as of ssdgs_scene_shadow(). */
 SSDGS_API ssdgs_result ssdgs_scene_light_map(ssdgs_scene *scene, int light, ssdgs_light_map *map, float *a,
@@ -3603,10 +3605,9 @@ typedef struct ssdgs__depth_job {
     ssdgs_real *depth;
 } ssdgs__depth_job;
 
-/* Sixteen rows. */
 static void ssdgs__depth_task(void *data, int index) {
     const ssdgs__depth_job *job = (const ssdgs__depth_job *)data;
-    for (int y = 16 * index; y < 16 * index + 16 && y < job->height; y++) {
+    for (int y = SSDGS__BAND * index; y < SSDGS__BAND * (index + 1) && y < job->height; y++) {
         const char *row = (const char *)job->buffer + y * job->pitch;
         ssdgs_real *to = job->depth + (size_t)y * (size_t)job->width;
         for (int x = 0; x < job->width; x++) {
@@ -3629,10 +3630,11 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
                                             : !buffer   ? "buffer"
                                                         : "depth")
                               : ssdgs__projection_matrix(context, projection, flags, p);
-    if (!result && (p[11] == 0 || width < 1 || height < 1))
+    if (!result && (width < 1 || height < 1))
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "depth buffer: %d x %d pixels", width, height);
+    if (!result && p[11] == 0)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
-                             "depth buffer: %d x %d pixels, row 2, column 3 of projection is %g", width,
-                             height, p[11]);
+                             "depth buffer: row 2, column 3 of projection is 0: its depths are all the same");
     if (result) return ssdgs__leave(context, result);
     /* clip z = p8 x + p9 y + p10 z + p11; clip x = p0 x + p2 z = (2 (column + 1/2) / width - 1) w; y alike */
     const double by_x = p[8] / p[0], by_y = p[9] / p[5], down = flags & SSDGS_CLIP_Y_DOWN ? 1 : -1;
@@ -3648,7 +3650,7 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
     job.height = height;
     job.from_0 = flags & SSDGS_CLIP_Z_FROM_0;
     job.depth = depth;
-    ssdgs__parallel(context, (height - 1) / 16 + 1, ssdgs__depth_task, &job);
+    ssdgs__parallel(context, (height - 1) / SSDGS__BAND + 1, ssdgs__depth_task, &job);
     return ssdgs__leave(context, SSDGS_OK);
 }
 
@@ -4583,11 +4585,13 @@ static int ssdgs__in_light(const ssdgs_light *light, const ssdgs_placed *o) {
 }
 
 /* Where the objects are, and of several which of them the camera and the lights reach. sees: whether the
-   camera any. */
+   camera any. Of one object it is asked only if the last frame drew nothing: boxes of models that are edited
+   from frame to frame take time. */
 static ssdgs_result ssdgs__find_reach(ssdgs_frame *frame, int *sees) {
     ssdgs_context *context = frame->context;
-    const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1,
-              boxed = !frame->training;
+    const int count = frame->object_count, rows = frame->light_count + 1, several = count > 1;
+    const ssdgs_splat_view *last = (const ssdgs_splat_view *)frame->memory->views.memory;
+    const int boxed = several || (!frame->training && !(last && last->visible));
     unsigned char *reach;
     SSDGS__RESERVE(frame->memory->reach, reach, unsigned char, ssdgs__times((size_t)count + 1, (size_t)rows));
     frame->reach = several ? reach : NULL;
@@ -8274,11 +8278,10 @@ typedef struct ssdgs__pixels_job {
     ptrdiff_t pitch;
 } ssdgs__pixels_job;
 
-/* Sixteen rows. */
 static void ssdgs__pixels_task(void *data, int index) {
     const ssdgs__pixels_job *job = (const ssdgs__pixels_job *)data;
     const ssdgs__framebuffer *f = &job->f;
-    for (int y = 16 * index; y < 16 * index + 16 && y < job->height; y++) {
+    for (int y = SSDGS__BAND * index; y < SSDGS__BAND * (index + 1) && y < job->height; y++) {
         const size_t row = (size_t)y * (size_t)(job->image->stride ? job->image->stride : job->width);
         const ssdgs_real *color = job->image->color + 3 * row,
                          *alpha = job->image->alpha ? job->image->alpha + row : NULL;
@@ -8313,11 +8316,11 @@ static void ssdgs__pixels(ssdgs_context *context, const ssdgs_image *image, int 
     job.straight = !blend && !(format & SSDGS_PREMULTIPLIED);
     job.pixels = (unsigned char *)pixels;
     job.pitch = pitch;
-    const int tasks = height > 0 ? (height - 1) / 16 + 1 : 0;
-    const int free_to_help = context && !ssdgs__enter(context, NULL);
-    if (free_to_help) ssdgs__parallel(context, tasks, ssdgs__pixels_task, &job);
-    for (int i = 0; i < tasks && !free_to_help; i++) ssdgs__pixels_task(&job, i);
-    if (free_to_help) (void)ssdgs__leave(context, SSDGS_OK);
+    const int tasks = height > 0 ? (height - 1) / SSDGS__BAND + 1 : 0;
+    const int pooled = context && !ssdgs__enter(context, NULL);
+    if (pooled) ssdgs__parallel(context, tasks, ssdgs__pixels_task, &job);
+    for (int i = 0; i < tasks && !pooled; i++) ssdgs__pixels_task(&job, i);
+    if (pooled) (void)ssdgs__leave(context, SSDGS_OK);
 }
 
 SSDGS_API void ssdgs_to_pixels(ssdgs_context *context, const ssdgs_image *image, int width, int height,

@@ -1028,8 +1028,7 @@ static int count_bytes(void *sum, const void *bytes, size_t size) {
     return 0;
 }
 
-/* What an engine asks for beside frames, each at 1280x720 where it is of pixels: one object that covers
-   little of them. */
+/* What an engine asks for beside frames: one object that covers few of 1280x720 pixels. Nothing moves. */
 static void measure_engine(bench *b) {
     enum { W = 1280, H = 720, CALLS = 8 };
     static const char *const names[CALLS] = {"frame, nothing in sight",     "frame, few pixels covered",
