@@ -963,6 +963,12 @@ static void test_occluder(void) {
     ssdgs_scene_occlude(scene, &half);
     together(object, 1, &camera, twice, 2, NULL, shot + 1);
     CHECK(asked == 600);
+    ssdgs_scene *ahead = NULL; /* but maps that are asked for are made */
+    CHECK(!ssdgs_scene_create(context, &ahead));
+    ssdgs_scene_occlude(ahead, &half);
+    CHECK(!ssdgs_scene_light(ahead, object, 1, NULL, twice, 2, NULL));
+    CHECK(asked == 1200);
+    ssdgs_scene_destroy(ahead);
     object[0].to_world[3] = (ssdgs_real)0.1, about[0] = 0;
     together(object, 1, &camera, twice, 2, NULL, shot + 1);
     CHECK(asked > 1500);
