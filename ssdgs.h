@@ -652,17 +652,33 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
                                           int light_count, const ssdgs_render_options *options,
                                           const ssdgs_image *image, ssdgs_render_stats *stats);
 
-/* What else takes light from the objects, meshes for instance. Multiplies fraction (count) by what of light
-   number `light` passes it on the way to points (count,3), world. Several threads call it at once. */
+/* A shadow map of an engine's meshes: depths seen from a light. Cascades and a cube's faces are several maps
+   of one light: a place is looked up, between four pixels, in the first that has it. */
+typedef struct ssdgs_shadow_map {
+    int light;              /* its number in the frame */
+    int width, height;      /* px */
+    int flags;              /* of matrix: SSDGS_COLUMN_MAJOR, SSDGS_CLIP_Y_DOWN, SSDGS_CLIP_Z_FROM_0 */
+    const float *depth;     /* (height,width) as for ssdgs_depth_from_buffer(); may be reversed */
+    ptrdiff_t pitch;        /* as there */
+    uint64_t revision;      /* another one whenever depths differ */
+    ssdgs_real matrix[16];  /* (4,4) clip = projection x view of the light, x a place in the world */
+    ssdgs_real bias, range; /* world units. bias: how far behind a surface nothing is in its shadow yet.
+                               range: above 0: depth has distances from the light / range instead */
+} ssdgs_shadow_map;
+/* What else takes light from the objects, meshes for instance. */
 typedef struct ssdgs_occluder {
+    /* Multiplies fraction (count) by what of light number `light` passes on the way to points (count,3),
+       world. Several threads call it at once. NULL: maps say it */
     void (*shadow)(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction);
     void *user;
-    uint64_t
-        revision; /* another one whenever the answer for a light may differ; until then what was found for
-                     Gaussians is kept. Pixels ask in every frame. Lights that move, come or go need none */
+    uint64_t revision; /* of shadow: another one whenever its answer for a light may differ; until then what
+                          was found for Gaussians is kept. Pixels ask in every frame. Lights that move, come
+                          or go need none */
+    const ssdgs_shadow_map *maps; /* (map_count) read in each frame, with their depths */
+    int map_count;
 } ssdgs_occluder;
 /* For the frames from now on: Gaussians, what scatters in them and pixels get what it leaves. NULL: nothing
-   else. Copied. */
+   else. Copied, but for the maps. Frames return ERR_ARGUMENT or ERR_NONFINITE where a map is not sound. */
 SSDGS_API void ssdgs_scene_occlude(ssdgs_scene *scene, const ssdgs_occluder *occluder);
 /* Makes the lights' maps of a frame ahead of it, for ssdgs_scene_shadow(). ssdgs_scene_render() with the same
    objects, lights and options finds them made. From then on every frame of the scene makes them. camera: the
@@ -1150,8 +1166,9 @@ typedef struct ssdgs_frame {
     ssdgs_real *pixel_visibility,
         *pixel_shadow; /* (lights, h, w) v, S where light is deferred; for components. In training v is there
                           for visibility_given alone */
-    const ssdgs_occluder *occluder; /* NULL: none; for WALK and COMPOSITE */
-    int maps;                       /* 1: light maps are asked for, whoever needs them */
+    const ssdgs_occluder
+        *occluder;        /* NULL, or with neither callback nor maps: none; for WALK and COMPOSITE */
+    int maps;             /* 1: light maps are asked for, whoever needs them */
     int visibility_given; /* 1: pixel_visibility is the caller's, held fixed or of rays traced by other
                              means */
     /* backward */
@@ -4122,6 +4139,31 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
     return SSDGS_OK;
 }
 
+static ssdgs_result ssdgs__occluder_check(ssdgs_context *context, const ssdgs_occluder *occluder) {
+    const int known = SSDGS_COLUMN_MAJOR | SSDGS_CLIP_Y_DOWN | SSDGS_CLIP_Z_FROM_0;
+    SSDGS__REFUSE(occluder->map_count < 0 || (occluder->map_count && !occluder->maps),
+                  occluder->map_count < 0 ? "%d shadow maps" : "%d shadow maps, but the array is NULL",
+                  occluder->map_count);
+    for (int i = 0; i < occluder->map_count; i++) {
+        const ssdgs_shadow_map *m = occluder->maps + i;
+        SSDGS__REFUSE(m->width < 1 || m->width > 32768 || m->height < 1 || m->height > 32768,
+                      "shadow map %d: %d x %d pixels, where 1 to 32768 are possible", i, m->width, m->height);
+        SSDGS__REFUSE(!m->depth || m->light < 0 || (m->flags & ~known),
+                      !m->depth      ? "shadow map %d: depth is NULL"
+                      : m->light < 0 ? "shadow map %d: light = %d"
+                                     : "shadow map %d: flags = %d",
+                      i, m->light < 0 ? m->light : m->flags);
+        SSDGS__REFUSE(!(m->bias >= 0 && ssdgs__finite(m->bias) && m->range >= 0 && ssdgs__finite(m->range)),
+                      "shadow map %d: bias = %g or range = %g is negative or not finite", i, (double)m->bias,
+                      (double)m->range);
+        for (int j = 0; j < 16; j++)
+            if (!ssdgs__finite(m->matrix[j]))
+                return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "shadow map %d: its matrix is not finite",
+                                   i);
+    }
+    return SSDGS_OK;
+}
+
 /* ==== >>options  how to render ==== */
 
 /* Presets and their checks, and what settings and options ask of a frame. */
@@ -4697,7 +4739,10 @@ static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted
     SSDGS__FOLD(key, own->first);
     SSDGS__FOLD(key, frame->options.stop);
     SSDGS__FOLD(key, frame->bias);
-    if (frame->occluder) SSDGS__FOLD(key, *frame->occluder);
+    if (frame->occluder && frame->occluder->shadow)
+        key = ssdgs__fold(key, frame->occluder, offsetof(ssdgs_occluder, maps));
+    for (int i = 0; frame->occluder && i < frame->occluder->map_count; i++)
+        if (frame->occluder->maps[i].light == index) SSDGS__FOLD(key, frame->occluder->maps[i]);
     own->wanted = ssdgs__casts(light) ? wanted : 0;
     own->kept = key == own->key && !(own->wanted & ~own->made);
     own->key = key;
@@ -4770,7 +4815,8 @@ static ssdgs_result ssdgs__frame_begin(ssdgs_frame *frame, ssdgs_context *contex
     frame->scratch = w;
     frame->camera = *camera;
     frame->lights = request->lights;
-    frame->occluder = request->occluder && request->occluder->shadow ? request->occluder : NULL;
+    frame->occluder = request->occluder;
+    if (frame->occluder) SSDGS__TRY(ssdgs__occluder_check(context, frame->occluder));
     frame->maps = request->maps;
     frame->light_count = request->maps ? light_count : 0;
     frame->training = training;
@@ -5311,13 +5357,79 @@ static void ssdgs__gather_light_task(void *data, int index) {
         }
 }
 
+/* What passes an engine's shadow map on the way to a point, of four comparisons; -1: it does not have the
+   place. away: unit vector from the light. */
+static ssdgs_real ssdgs__shadow_map_at(const ssdgs_shadow_map *m, const ssdgs_real *point,
+                                       const double away[3], double distance) {
+    const int columns = m->flags & SSDGS_COLUMN_MAJOR;
+    double at[4], by[4], passed = 0; /* in clip space, and how it changes away from the light */
+    for (int i = 0; i < 4; i++) {
+        at[i] = (double)m->matrix[columns ? 12 + i : 4 * i + 3];
+        by[i] = 0;
+        for (int j = 0; j < 3; j++) {
+            const double factor = (double)m->matrix[columns ? 4 * j + i : 4 * i + j];
+            at[i] += factor * (double)point[j];
+            by[i] += factor * away[j];
+        }
+    }
+    const double down = m->flags & SSDGS_CLIP_Y_DOWN ? 1 : -1, w = m->width, h = m->height;
+    double x = (1 + at[0] / at[3]) / 2 * w - 0.5, y = (1 + down * at[1] / at[3]) / 2 * h - 0.5;
+    if (!(at[3] > 0 && x >= -0.5 && x <= w - 0.5 && y >= -0.5 && y <= h - 0.5)) return -1;
+    const int reversed = !(m->range > 0) && by[2] * at[3] < at[2] * by[3];
+    const double z = (at[2] - (double)m->bias * by[2]) / (at[3] - (double)m->bias * by[3]);
+    double d = m->range > 0                     ? (distance - (double)m->bias) / (double)m->range
+               : m->flags & SSDGS_CLIP_Z_FROM_0 ? z
+                                                : (1 + z) / 2;
+    d = d > 1 ? 1 : d > 0 ? d : 0; /* beyond what the map has seen there is nothing */
+    x = x > 0 ? x : 0, y = y > 0 ? y : 0;
+    for (int i = 0; i < 4; i++) {
+        const int column = (int)x + (i & 1), row = (int)y + (i >> 1);
+        const double part = (i & 1 ? x - (int)x : (int)x + 1 - x) * (i >> 1 ? y - (int)y : (int)y + 1 - y);
+        const float *from =
+            (const float *)((const char *)m->depth + m->pitch * (row < m->height ? row : m->height - 1));
+        const double there = (double)from[column < m->width ? column : m->width - 1];
+        passed += (reversed ? there > d : there < d) ? 0 : part;
+    }
+    return (ssdgs_real)passed;
+}
+
+/* Whether the occluder has something to say of a light. */
+static int ssdgs__occluded(const ssdgs_frame *frame, int light) {
+    const ssdgs_occluder *o = frame->occluder;
+    int any = o && o->shadow;
+    for (int i = 0; o && i < o->map_count && !any; i++) any = o->maps[i].light == light;
+    return any;
+}
+
+/* What the occluder leaves of a light at points: fraction (count). */
+static void ssdgs__let_pass(const ssdgs_frame *frame, int light, const ssdgs_real *points, int count,
+                            ssdgs_real *fraction) {
+    const ssdgs_occluder *o = frame->occluder;
+    const ssdgs_light *from = frame->lights + light;
+    for (int i = 0; i < count; i++) fraction[i] = 1;
+    if (count && o->shadow) o->shadow(o->user, light, points, count, fraction);
+    for (int i = 0; i < count; i++, points += 3) {
+        double away[3], distance = 0;
+        for (int c = 0; c < 3; c++) {
+            const double d = (double)points[c] - (double)from->position[c];
+            away[c] = from->kind == SSDGS_LIGHT_DIRECTIONAL ? (double)from->direction[c] : d;
+            distance += away[c] * away[c];
+        }
+        distance = sqrt(distance);
+        for (int c = 0; c < 3; c++) away[c] /= distance > 0 ? distance : 1;
+        ssdgs_real passed = -1;
+        for (int j = 0; j < o->map_count && passed < 0; j++)
+            if (o->maps[j].light == light) passed = ssdgs__shadow_map_at(o->maps + j, points, away, distance);
+        if (passed >= 0) fraction[i] *= passed;
+    }
+}
+
 /* Multiplies the visibility and flux of Gaussians `which` by the occluder's fractions. */
 static void ssdgs__occlude(const ssdgs_frame *frame, int light, const int *which, const ssdgs_real *points,
                            int count) {
     const size_t first = (size_t)frame->count * (size_t)light;
     ssdgs_real fraction[SSDGS__POINTS];
-    for (int i = 0; i < count; i++) fraction[i] = 1;
-    if (count) frame->occluder->shadow(frame->occluder->user, light, points, count, fraction);
+    ssdgs__let_pass(frame, light, points, count, fraction);
     for (int i = 0; i < count; i++) {
         frame->visibility[first + (size_t)which[i]] *= fraction[i];
         if (frame->flux) frame->flux[first + (size_t)which[i]] *= fraction[i];
@@ -5410,7 +5522,8 @@ static ssdgs_result ssdgs__walk(ssdgs_frame *frame) {
             job.end_view++;
         if (frame->views[job.first_view].cached) continue;
         ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__gather_light_task, &job);
-        if (frame->occluder) ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__occlude_task, &job);
+        if (ssdgs__occluded(frame, job.light))
+            ssdgs__parallel(context, SSDGS__BIN_CHUNKS, ssdgs__occlude_task, &job);
     }
     return SSDGS_OK;
 }
@@ -7150,6 +7263,7 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
                                     ssdgs_real *visibility) {
     ssdgs_real points[3 * SSDGS__POINTS], fraction[SSDGS__POINTS];
     int lanes[SSDGS__POINTS], points_count = 0;
+    const int occluded = ssdgs__occluded(frame, light);
     for (int micro = 0; micro < 16; micro++) {
         const ssdgs_real *depth = layers + SSDGS__DEPTH_LAYER * SSDGS__TILE_LAYER + 64 * micro,
                          *own = layers + SSDGS__SHADOW_LAYER * SSDGS__TILE_LAYER + 64 * micro + 16;
@@ -7164,15 +7278,14 @@ static void ssdgs__pixel_visibility(const ssdgs_frame *frame, const ssdgs__light
         ssdgs__places_transmittance(frame, k, light, tile, micro, depth, passed, ray, at, NULL);
         for (int i = 0; i < 16; i++) {
             if (passed[i] < 0) passed[i] = own[i] / depth[i + 32]; /* has what the occluder says already */
-            else if (frame->occluder && depth[i + 32] > SSDGS__THIN) {
+            else if (occluded && depth[i + 32] > SSDGS__THIN) {
                 for (int c = 0; c < 3; c++) points[3 * points_count + c] = at[i + 16 * c];
-                fraction[points_count] = 1;
                 lanes[points_count++] = 64 * micro + i;
             }
         }
     }
     if (!points_count) return;
-    frame->occluder->shadow(frame->occluder->user, light, points, points_count, fraction);
+    ssdgs__let_pass(frame, light, points, points_count, fraction);
     while (points_count--) visibility[lanes[points_count]] *= fraction[points_count];
 }
 

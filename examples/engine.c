@@ -9,16 +9,25 @@
 #include "reduce.h"
 #include "unbake.h"
 
-enum { OBJECTS = 3, LIGHTS = 3, TILES = 24, SHEET = 3, BALL = 2000 };
+enum { OBJECTS = 3, LIGHTS = 3, CASTING = 2, TILES = 24, SHEET = 3, BALL = 2000, SHADOW = 512 };
 
 /* ---- the engine: its framebuffer, its triangles, its matrices (OpenGL's) ---- */
 
+/* Where triangles are drawn. Matrices have their columns one after the other. */
+typedef struct raster {
+    int width, height;
+    float matrix[16];               /* projection x view */
+    float *buffer;                  /* OpenGL's depth, 0 .. 1 */
+    float *normal, *albedo, *world; /* of each pixel; NULL: depth alone */
+} raster;
+
 typedef struct level {
     int width, height;
-    float view[16], projection[16]; /* columns one after the other */
+    float view[16], projection[16];
+    raster screen, shadow[CASTING]; /* shadow: of the lights that meshes keep from splats and each other */
+    ssdgs_shadow_map maps[CASTING]; /* the same for the library */
     unsigned char *pixels;          /* (h,w,4) sRGB */
-    float *buffer;                  /* OpenGL's depth, 0 .. 1 */
-    float *normal, *albedo, *world, *lit, *passed;
+    float *lit, *passed;
     ssdgs_camera camera;
     ssdgs_light lights[LIGHTS];
     ssdgs_object objects[OBJECTS];
@@ -37,6 +46,18 @@ static void perspective(float fov_y, float aspect, float near_plane, float out[1
     const float f = 1 / tanf(fov_y / 2);
     memset(out, 0, 16 * sizeof *out);
     out[0] = f / aspect, out[5] = f, out[10] = out[11] = -1, out[14] = -2 * near_plane;
+}
+
+static void parallel(float half, float depth, float out[16]) { /* a box, half as wide, ahead of the eye */
+    memset(out, 0, 16 * sizeof *out);
+    out[0] = out[5] = 1 / half, out[10] = -2 / depth, out[14] = -1, out[15] = 1;
+}
+
+static void multiply(const float a[16], const float b[16], float out[16]) {
+    for (int i = 0; i < 16; i++) {
+        out[i] = 0;
+        for (int j = 0; j < 4; j++) out[i] += a[4 * j + i % 4] * b[i / 4 * 4 + j];
+    }
 }
 
 static void normalize(float v[3]) {
@@ -61,25 +82,30 @@ static void look_at(const float eye[3], const float target[3], float out[16]) { 
     out[15] = 1;
 }
 
+/* Clip space of a place. */
+static void transform(const float matrix[16], const float at[3], float clip[4]) {
+    for (int i = 0; i < 4; i++)
+        clip[i] = matrix[i] * at[0] + matrix[4 + i] * at[1] + matrix[8 + i] * at[2] + matrix[12 + i];
+}
+
 /* A triangle into the depth buffer, and its pixels' place, normal, colour. */
-static void triangle(level *l, float corner[3][3], const float normal[3], const float albedo[3]) {
-    float x[3], y[3], w[3];
+static void triangle(raster *r, float corner[3][3], const float normal[3], const float albedo[3]) {
+    float x[3], y[3], z[3], w[3];
     for (int i = 0; i < 3; i++) {
-        float v[3];
-        for (int c = 0; c < 3; c++)
-            v[c] = l->view[c] * corner[i][0] + l->view[4 + c] * corner[i][1] + l->view[8 + c] * corner[i][2] +
-                   l->view[12 + c];
-        w[i] = -v[2];
+        float clip[4];
+        transform(r->matrix, corner[i], clip);
+        w[i] = clip[3];
         if (w[i] < 0.05f) return;
-        x[i] = (l->projection[0] * v[0] / w[i] + 1) * 0.5f * (float)l->width;
-        y[i] = (1 - l->projection[5] * v[1] / w[i]) * 0.5f * (float)l->height;
+        x[i] = (clip[0] / w[i] + 1) * 0.5f * (float)r->width;
+        y[i] = (1 - clip[1] / w[i]) * 0.5f * (float)r->height;
+        z[i] = 0.5f + 0.5f * clip[2] / w[i];
     }
     const float area = (x[1] - x[0]) * (y[2] - y[0]) - (x[2] - x[0]) * (y[1] - y[0]);
     if (fabsf(area) < 1e-9f) return;
     float low_x = fminf(x[0], fminf(x[1], x[2])), high_x = fmaxf(x[0], fmaxf(x[1], x[2]));
     float low_y = fminf(y[0], fminf(y[1], y[2])), high_y = fmaxf(y[0], fmaxf(y[1], y[2]));
     low_x = fmaxf(low_x, 0), low_y = fmaxf(low_y, 0);
-    high_x = fminf(high_x, (float)l->width - 1), high_y = fminf(high_y, (float)l->height - 1);
+    high_x = fminf(high_x, (float)r->width - 1), high_y = fminf(high_y, (float)r->height - 1);
     for (int py = (int)low_y; (float)py <= high_y; py++)
         for (int px = (int)low_x; (float)px <= high_x; px++) {
             const float at_x = (float)px + 0.5f, at_y = (float)py + 0.5f;
@@ -89,40 +115,41 @@ static void triangle(level *l, float corner[3][3], const float normal[3], const 
                 b[i] = ((x[j] - at_x) * (y[k] - at_y) - (x[k] - at_x) * (y[j] - at_y)) / area;
             }
             if (b[0] < 0 || b[1] < 0 || b[2] < 0) continue;
+            const int pixel = py * r->width + px;
+            const float value = b[0] * z[0] + b[1] * z[1] + b[2] * z[2];
+            if (value < 0 || value >= r->buffer[pixel]) continue;
+            r->buffer[pixel] = value;
+            if (!r->world) continue;
             const float depth = 1 / (b[0] / w[0] + b[1] / w[1] + b[2] / w[2]);
-            const int pixel = py * l->width + px;
-            const float value = 0.5f + 0.5f * (l->projection[14] / depth - l->projection[10]);
-            if (value >= l->buffer[pixel]) continue;
-            l->buffer[pixel] = value;
             for (int c = 0; c < 3; c++) {
-                l->world[3 * pixel + c] = depth * (b[0] * corner[0][c] / w[0] + b[1] * corner[1][c] / w[1] +
+                r->world[3 * pixel + c] = depth * (b[0] * corner[0][c] / w[0] + b[1] * corner[1][c] / w[1] +
                                                    b[2] * corner[2][c] / w[2]);
-                l->normal[3 * pixel + c] = normal[c];
-                l->albedo[3 * pixel + c] = albedo[c];
+                r->normal[3 * pixel + c] = normal[c];
+                r->albedo[3 * pixel + c] = albedo[c];
             }
         }
 }
 
-static void quad(level *l, float corner[4][3], const float normal[3], const float albedo[3]) {
+static void quad(raster *r, float corner[4][3], const float normal[3], const float albedo[3]) {
     float second[3][3];
     memcpy(second[0], corner[0], sizeof second[0]);
     memcpy(second[1], corner[2], sizeof second[1]);
     memcpy(second[2], corner[3], sizeof second[2]);
-    triangle(l, corner, normal, albedo);
-    triangle(l, second, normal, albedo);
+    triangle(r, corner, normal, albedo);
+    triangle(r, second, normal, albedo);
 }
 
-static void draw_meshes(level *l) {
+static void draw_meshes(const level *l, raster *r) {
     const float up[3] = {0, 0, 1}, dark[3] = {0.22f, 0.22f, 0.24f}, light[3] = {0.5f, 0.48f, 0.45f},
                 red[3] = {0.6f, 0.14f, 0.08f};
-    for (int i = 0; i < l->width * l->height; i++) {
-        l->buffer[i] = 1;
-        memset(l->albedo + 3 * i, 0, 3 * sizeof *l->albedo);
+    for (int i = 0; i < r->width * r->height; i++) {
+        r->buffer[i] = 1;
+        if (r->albedo) memset(r->albedo + 3 * i, 0, 3 * sizeof *r->albedo);
     }
     for (int i = 0; i < TILES * TILES; i++) { /* the floor, a chessboard */
         const float s = 0.5f, x = s * (float)(i % TILES - TILES / 2), y = s * (float)(i / TILES - TILES / 2);
         float tile[4][3] = {{x, y, 0}, {x + s, y, 0}, {x + s, y + s, 0}, {x, y + s, 0}};
-        quad(l, tile, up, (i % TILES + i / TILES) % 2 ? light : dark);
+        quad(r, tile, up, (i % TILES + i / TILES) % 2 ? light : dark);
     }
     for (int face = 0; face < 6; face++) { /* the box */
         const int axis = face / 2, a = (axis + 1) % 3, b = (axis + 2) % 3;
@@ -133,34 +160,41 @@ static void draw_meshes(level *l) {
             corner[i][a] = i == 1 || i == 2 ? l->box_high[a] : l->box_low[a];
             corner[i][b] = i > 1 ? l->box_high[b] : l->box_low[b];
         }
-        quad(l, corner, normal, red);
+        quad(r, corner, normal, red);
     }
 }
 
-/* Whether the box stands between a point and a light: what a shadow map would say. */
-static int box_hides(const level *l, int light, const float point[3]) {
-    float begin = 1e-3f, end = 1;
-    if (l->lights[light].unshadowed) return 0;
-    for (int c = 0; c < 3; c++) {
-        const ssdgs_light *lamp = l->lights + light;
-        const float from = point[c];
-        const float along =
-            lamp->kind == SSDGS_LIGHT_DIRECTIONAL ? -100 * lamp->direction[c] : lamp->position[c] - from;
-        float near_side = (l->box_low[c] - from) / along, far_side = (l->box_high[c] - from) / along;
-        if (fabsf(along) < 1e-9f) {
-            if (from < l->box_low[c] || from > l->box_high[c]) return 0;
-            continue;
-        }
-        begin = fmaxf(begin, fminf(near_side, far_side));
-        end = fminf(end, fmaxf(near_side, far_side));
-    }
-    return begin < end;
+/* The shadow map of a light, for meshes, and for the library to know what meshes take from splats. */
+static void draw_shadow_map(level *l, int light, const float eye[3], const float target[3],
+                            const float projection[16]) {
+    raster *r = l->shadow + light;
+    ssdgs_shadow_map *map = l->maps + light;
+    float view[16];
+    look_at(eye, target, view);
+    multiply(projection, view, r->matrix);
+    draw_meshes(l, r);
+    map->light = light;
+    map->width = r->width, map->height = r->height;
+    map->flags = SSDGS_COLUMN_MAJOR;
+    map->depth = r->buffer;
+    map->pitch = (ptrdiff_t)sizeof *r->buffer * r->width;
+    if (memcmp(map->matrix, r->matrix, sizeof map->matrix) != 0) map->revision++; /* the box does not move */
+    memcpy(map->matrix, r->matrix, sizeof map->matrix);
+    map->bias = 0.02f;
+    map->range = 0; /* depths are the projection's */
 }
 
-/* Meshes take light from splats: the library asks, by several threads at once. */
-static void mesh_shadow(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
-    for (int i = 0; i < count; i++)
-        if (box_hides((const level *)user, light, points + 3 * i)) fraction[i] = 0;
+/* Whether meshes hide a light from a place on one of them. */
+static int in_shadow(const level *l, int light, const float point[3], const float normal[3]) {
+    const raster *r = l->shadow + light;
+    float clip[4], at[3];
+    if (light >= CASTING) return 0;
+    for (int c = 0; c < 3; c++) at[c] = point[c] + 0.02f * normal[c];
+    transform(r->matrix, at, clip);
+    const float x = (1 + clip[0] / clip[3]) / 2 * (float)r->width,
+                y = (1 - clip[1] / clip[3]) / 2 * (float)r->height;
+    if (!(clip[3] > 0 && x >= 0 && y >= 0 && x < (float)r->width && y < (float)r->height)) return 0;
+    return r->buffer[(int)y * r->width + (int)x] < 0.5f + 0.5f * clip[2] / clip[3];
 }
 
 /* What of a light comes to a place on a mesh, before shadows: irradiance. */
@@ -185,18 +219,19 @@ static const float sky[3][3] = {{0.10f, 0.12f, 0.15f}, {0, 0, 0}, {0.05f, 0.06f,
 
 /* Lights the meshes' pixels. Splats take light from them: the scene is asked for all pixels at once. */
 static ssdgs_result shade_meshes(level *l) {
+    const raster *r = &l->screen;
     const int pixels = l->width * l->height;
     for (int i = 0; i < 3 * pixels; i++)
-        l->lit[i] = l->albedo[i] * (sky[0][i % 3] + sky[2][i % 3] * l->normal[3 * (i / 3) + 2]) / 3.14159265f;
+        l->lit[i] = r->albedo[i] * (sky[0][i % 3] + sky[2][i % 3] * r->normal[3 * (i / 3) + 2]) / 3.14159265f;
     for (int light = 0; light < LIGHTS; light++) {
-        const ssdgs_result result = ssdgs_scene_shadow(l->scene, light, l->world, pixels, l->passed);
+        const ssdgs_result result = ssdgs_scene_shadow(l->scene, light, r->world, pixels, l->passed);
         if (result) return result;
         for (int i = 0; i < pixels; i++) {
-            const float *at = l->world + 3 * i;
-            if (!(l->buffer[i] < 1) || box_hides(l, light, at)) continue;
-            const float e = irradiance(l, light, at, l->normal + 3 * i) * l->passed[i] / 3.14159265f;
+            const float *at = r->world + 3 * i;
+            if (!(r->buffer[i] < 1) || in_shadow(l, light, at, r->normal + 3 * i)) continue;
+            const float e = irradiance(l, light, at, r->normal + 3 * i) * l->passed[i] / 3.14159265f;
             for (int c = 0; c < 3; c++)
-                l->lit[3 * i + c] += l->albedo[3 * i + c] * e * l->lights[light].intensity[c];
+                l->lit[3 * i + c] += r->albedo[3 * i + c] * e * l->lights[light].intensity[c];
         }
     }
     ssdgs_image image;
@@ -264,11 +299,18 @@ static void move(level *l, float t) { /* t: 0 .. 1 */
     const float eye[3] = {3.2f * sinf(0.5f * sinf(turn)), -3.2f * cosf(0.5f * sinf(turn)), 1.7f};
     look_at(eye, aim, l->view);
     perspective(0.75f, (float)l->width / (float)l->height, 0.05f, l->projection);
+    multiply(l->projection, l->view, l->screen.matrix);
     const float lamp[3] = {2.2f * cosf(turn), -1.2f + 0.8f * sinf(turn), 2.6f};
     const float beam[3] = {aim[0] - lamp[0], aim[1] - lamp[1], aim[2] - lamp[2]}, unit = 1 / l->light_scale;
     const float warm[3] = {30 * unit, 30 * unit, 24 * unit},
                 cool[3] = {0.5f * unit, 0.6f * unit, 0.7f * unit},
                 faint[3] = {0.2f * unit, 0.2f * unit, 0.2f * unit};
+    float lens[16], above[3];
+    perspective(1.1f, 1, 0.1f, lens); /* wider than the spot */
+    draw_shadow_map(l, 0, lamp, aim, lens);
+    parallel(3.5f, 12, lens);
+    for (int c = 0; c < 3; c++) above[c] = aim[c] - 6 * sun[c];
+    draw_shadow_map(l, 1, above, aim, lens);
     l->lights[0] = ssdgs_light_spot(lamp, beam, warm, 0.3f, 0.5f);
     l->lights[1] = ssdgs_light_directional(sun, cool);
     l->lights[1].kept = 0.6f; /* so much of what plain splats keep is missing in the sun's shadow */
@@ -296,12 +338,11 @@ static ssdgs_result draw_frame(level *l, float t) {
                                                      l->width, l->height, &l->camera);
     if (!result)
         result = ssdgs_scene_light(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options);
-    if (!result) draw_meshes(l);
+    if (!result) draw_meshes(l, &l->screen);
     if (!result) result = shade_meshes(l);
     if (!result)
-        result =
-            ssdgs_depth_from_buffer(l->context, l->projection, SSDGS_COLUMN_MAJOR, l->buffer,
-                                    (ptrdiff_t)sizeof *l->buffer * l->width, l->width, l->height, l->depth);
+        result = ssdgs_depth_from_buffer(l->context, l->projection, SSDGS_COLUMN_MAJOR, l->screen.buffer,
+                                         (ptrdiff_t)sizeof(float) * l->width, l->width, l->height, l->depth);
     if (!result)
         result = ssdgs_scene_render(l->scene, l->objects, OBJECTS, &l->camera, l->lights, LIGHTS, &options,
                                     &image, &l->stats);
@@ -357,7 +398,7 @@ static void load_model(void *loads, int index) {
 }
 
 static ssdgs_result open_level(level *l, const char *const models[2]) {
-    const ssdgs_occluder meshes = {mesh_shadow, l, 1}; /* the box does not move; a moving one changes the 1 */
+    const ssdgs_occluder meshes = {NULL, NULL, 0, l->maps, CASTING};
     const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
     load loads[2];
     memcpy(l->box_low, low, sizeof low);
@@ -423,13 +464,18 @@ int main(int argc, char **argv) {
         return 2;
     }
     const size_t pixels = (size_t)l.width * (size_t)l.height;
-    float *planes = (float *)calloc(pixels * 19, sizeof *planes);
+    float *planes = (float *)calloc(pixels * 19 + CASTING * SHADOW * SHADOW, sizeof *planes);
     unsigned char *sheet = (unsigned char *)calloc(pixels * SHEET * SHEET, 4);
     l.pixels = (unsigned char *)malloc(pixels * 4);
-    l.depth = planes, l.alpha = planes + pixels, l.passed = planes + 2 * pixels,
-    l.normal = planes + 3 * pixels;
-    l.albedo = planes + 6 * pixels, l.world = planes + 9 * pixels, l.lit = planes + 12 * pixels;
-    l.color = planes + 15 * pixels, l.buffer = planes + 18 * pixels;
+    l.depth = planes, l.alpha = planes + pixels, l.passed = planes + 2 * pixels;
+    l.lit = planes + 3 * pixels, l.color = planes + 6 * pixels;
+    l.screen.width = l.width, l.screen.height = l.height, l.screen.buffer = planes + 9 * pixels;
+    l.screen.normal = planes + 10 * pixels, l.screen.albedo = planes + 13 * pixels,
+    l.screen.world = planes + 16 * pixels;
+    for (int i = 0; i < CASTING; i++) {
+        l.shadow[i].width = l.shadow[i].height = SHADOW;
+        l.shadow[i].buffer = planes + 19 * pixels + (size_t)i * SHADOW * SHADOW;
+    }
     failed = !planes || !sheet || !l.pixels;
     if (failed) fprintf(stderr, "out of memory\n");
     ssdgs_result result = failed ? SSDGS_OK : open_level(&l, models);

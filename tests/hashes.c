@@ -252,7 +252,7 @@ static ssdgs_result place(ssdgs_model *model) {
     static unsigned char mask[100000], bytes[PIXELS * 8];
     ssdgs_image image = planes_of(planes);
     ssdgs_render_options options = ssdgs_render_options_default();
-    ssdgs_occluder occluder = {shade, NULL, 1};
+    ssdgs_occluder occluder = {shade, NULL, 1, NULL, 0};
     ssdgs_light lights[7] = {photos[2].light, photos[5].light, photos[4].light, photos[3].light};
     ssdgs_object objects[3];
     ssdgs_model *wax = NULL;

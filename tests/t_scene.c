@@ -925,7 +925,7 @@ static void test_occluder(void) {
     object[1] = ssdgs_object_default(plate);
     there.to_world[11] = object[1].to_world[11] = (ssdgs_real)1.2;
     CHECK(!ssdgs_scene_light(other_scene, &there, 1, NULL, lights, 2, NULL));
-    ssdgs_occluder occluder = {of_scene, other_scene, 1};
+    ssdgs_occluder occluder = {of_scene, other_scene, 1, NULL, 0};
     for (int transport = 0; transport < 2; transport++) {
         const ssdgs_render_options options = ssdgs_render_options_exact();
         together(object, 2, &camera, lights, 2, &options, shot);
@@ -951,7 +951,7 @@ static void test_occluder(void) {
         ball = object[0].model = cloud(&s, 0, 300, 0.3);
     }
     int second = 1;
-    ssdgs_occluder half = {half_of, &second, 1};
+    ssdgs_occluder half = {half_of, &second, 1, NULL, 0};
     together(object, 1, &camera, lights + 1, 1, NULL, shot);
     const ssdgs_light twice[2] = {lights[1], lights[1]};
     ssdgs_scene_occlude(scene, &half);
@@ -1066,6 +1066,248 @@ static void test_ahead(void) {
     ssdgs_scene_occlude(NULL, NULL);
     ssdgs_scene_destroy(ahead);
     ssdgs_model_destroy(model);
+}
+
+enum { MAP = 96, REVERSED = 8, ENDLESS = 16, PARALLEL = 32, RADIAL = 64, UPWARDS = 128, CONVENTIONS = 256 };
+
+/* How a shadow map is seen: from where, along which axes, how far to the sides. */
+typedef struct looking {
+    double eye[3], right[3], up[3], ahead[3], wide;
+    int convention;
+} looking;
+
+/* Whether a plate of 0.8 x 0.6 at z = 0.5 is between a place and the light. near_edge: by how much not, or
+ * so. */
+static int plate_hides(const looking *l, const double *at, double *near_edge) {
+    double from[3];
+    for (int c = 0; c < 3; c++) from[c] = l->convention & PARALLEL ? at[c] - 9 * l->ahead[c] : l->eye[c];
+    const double t = (0.5 - at[2]) / (from[2] - at[2]);
+    const double x = at[0] + t * (from[0] - at[0]), y = at[1] + t * (from[1] - at[1]);
+    *near_edge = fmax(fabs(x) - 0.4, fabs(y) - 0.3);
+    return t > 0 && t < 1 && *near_edge < 0;
+}
+
+/* The light's matrix, and its map of the plate and a floor at z = -1. */
+static void make_shadow_map(const looking *l, ssdgs_shadow_map *map, float depth[MAP * MAP]) {
+    const int c = l->convention, parallel = c & PARALLEL;
+    const double near_plane = 0.1, far_plane = 10;
+    double rows[4][4] = {{0}}, zw[2]; /* clip z = zw[0] z + zw[1] of the way ahead, within 0 .. w */
+    if (parallel) zw[0] = 1 / (far_plane - near_plane), zw[1] = -near_plane * zw[0];
+    else if (c & ENDLESS) zw[0] = 1, zw[1] = -near_plane;
+    else zw[0] = far_plane / (far_plane - near_plane), zw[1] = -near_plane * zw[0];
+    for (int j = 0; j < 4; j++) {
+        double x = 0, y = 0, z = 0;
+        for (int i = 0; i < 3; i++) {
+            const double at = j < 3 ? i == j : -l->eye[i];
+            x += l->right[i] * at, y += l->up[i] * at, z += l->ahead[i] * at;
+        }
+        const double one = j == 3, w = parallel ? one : z;
+        rows[0][j] = x / l->wide, rows[1][j] = y / l->wide * (c & SSDGS_CLIP_Y_DOWN ? -1 : 1);
+        rows[2][j] = zw[0] * z + zw[1] * one, rows[3][j] = w;
+        if (c & REVERSED) rows[2][j] = w - rows[2][j];
+        if (!(c & SSDGS_CLIP_Z_FROM_0)) rows[2][j] = 2 * rows[2][j] - w;
+    }
+    memset(map, 0, sizeof *map);
+    map->width = map->height = MAP;
+    map->flags = c & 7;
+    map->range = (ssdgs_real)(c & RADIAL ? 7 : 0);
+    map->bias = (ssdgs_real)0.02;
+    map->pitch = (c & UPWARDS ? -1 : 1) * (ptrdiff_t)(MAP * sizeof *depth);
+    map->depth = depth + (c & UPWARDS ? MAP * (MAP - 1) : 0);
+    for (int i = 0; i < 16; i++)
+        map->matrix[c & SSDGS_COLUMN_MAJOR ? i % 4 * 4 + i / 4 : i] = (ssdgs_real)rows[i / 4][i % 4];
+    for (int i = 0; i < MAP * MAP; i++) {
+        const double x = (2 * (i % MAP + 0.5) / MAP - 1) * l->wide,
+                     y = (1 - 2 * (i / MAP + 0.5) / MAP) * l->wide;
+        double along[3], from[3], clip[4], distance = 0, edge;
+        for (int j = 0; j < 3; j++) {
+            const double side = x * l->right[j] + y * l->up[j];
+            along[j] = l->ahead[j] + (parallel ? 0 : side);
+            from[j] = l->eye[j] + (parallel ? side : 0);
+        }
+        double at[3];
+        for (int j = 0; j < 3; j++) at[j] = from[j] + along[j] * (-1 - from[2]) / along[2];
+        if (plate_hides(l, at, &edge))
+            for (int j = 0; j < 3; j++) at[j] = from[j] + along[j] * (0.5 - from[2]) / along[2];
+        for (int j = 0; j < 4; j++)
+            clip[j] = rows[j][0] * at[0] + rows[j][1] * at[1] + rows[j][2] * at[2] + rows[j][3];
+        for (int j = 0; j < 3; j++) distance += (at[j] - l->eye[j]) * (at[j] - l->eye[j]);
+        const double z = clip[2] / clip[3], value = c & SSDGS_CLIP_Z_FROM_0 ? z : (1 + z) / 2;
+        depth[(c & UPWARDS ? MAP - 1 - i / MAP : i / MAP) * MAP + i % MAP] =
+            (float)(c & RADIAL ? sqrt(distance) / 7 : value);
+    }
+}
+
+/* An engine's shadow map says where a plate's shadow is, by every convention. */
+static void test_shadow_maps(void) {
+    static float depth[MAP * MAP], other_depth[MAP * MAP];
+    const double s = 1 / sqrt(6.0);
+    looking l = {{0.6, -0.3, 1.8}, {2 * s, -s, -s}, {0, 0, 0}, {-1, 0, 0}, 1.1, 0};
+    const double length = sqrt(0.6 * 0.6 + 0.3 * 0.3 + 1.8 * 1.8);
+    for (int c = 0; c < 3; c++) l.ahead[c] = -l.eye[c] / length;
+    double along = 0, norm2 = 0;
+    for (int c = 0; c < 3; c++) along += l.right[c] * l.ahead[c];
+    for (int c = 0; c < 3; c++) l.right[c] -= along * l.ahead[c], norm2 += l.right[c] * l.right[c];
+    for (int c = 0; c < 3; c++) l.right[c] /= sqrt(norm2);
+    for (int c = 0; c < 3; c++)
+        l.up[c] = l.right[(c + 1) % 3] * l.ahead[(c + 2) % 3] - l.right[(c + 2) % 3] * l.ahead[(c + 1) % 3];
+    const ssdgs_real ahead[3] = {(ssdgs_real)l.ahead[0], (ssdgs_real)l.ahead[1], (ssdgs_real)l.ahead[2]},
+                     even[3] = {1, 1, 1};
+    const ssdgs_light lights[2] = {point_light(0.6, -0.3, 1.8), ssdgs_light_directional(ahead, even)};
+    ssdgs_shadow_map maps[2];
+    ssdgs_occluder occluder = {NULL, NULL, 0, maps, 1};
+    ssdgs_frame frame;
+    memset(&frame, 0, sizeof frame);
+    frame.occluder = &occluder;
+    frame.light_count = 2;
+    frame.lights = lights;
+    for (l.convention = 0; l.convention < CONVENTIONS; l.convention++) {
+        int dark = 0, wrong = 0;
+        if ((l.convention & RADIAL) && (l.convention & (PARALLEL | REVERSED))) continue;
+        make_shadow_map(&l, maps, depth);
+        maps->light = (l.convention & PARALLEL) != 0;
+        for (uint64_t i = 0; i < 400; i++) {
+            double edge;
+            const double at[3] = {2.4 * draw(3 * i) - 1.2, 2.4 * draw(3 * i + 1) - 1.2,
+                                  1.6 * draw(3 * i + 2) - 0.9};
+            const ssdgs_real point[3] = {(ssdgs_real)at[0], (ssdgs_real)at[1], (ssdgs_real)at[2]};
+            ssdgs_real fraction[2];
+            const int hidden = plate_hides(&l, at, &edge);
+            if (fabs(edge) < 0.08 || fabs(at[2] - 0.5) < 0.05) continue;
+            for (int light = 0; light < 2; light++)
+                ssdgs__let_pass(&frame, light, point, 1, fraction + light);
+            wrong += fraction[maps->light] < !hidden || fraction[maps->light] > !hidden;
+            wrong += fraction[!maps->light] < 1; /* of which there is no map */
+            dark += hidden;
+        }
+        if (!CHECK(dark > 10 && !wrong))
+            printf("    convention %d: %d wrong, %d dark\n", l.convention, wrong, dark);
+    }
+    l.convention = 0;
+    make_shadow_map(&l, maps, depth);
+    const ssdgs_real below[9] = {0, 0, (ssdgs_real)0.499, 0, 0, (ssdgs_real)0.4, 0, 0, 0},
+                     beside[9] = {9, 0, 0, (ssdgs_real)1.2, (ssdgs_real)-0.6, (ssdgs_real)3.6, 0, 0, -90};
+    ssdgs_real passed[3];
+    for (l.convention = RADIAL; l.convention >= 0; l.convention -= RADIAL) {
+        make_shadow_map(&l, maps, depth);
+        ssdgs__let_pass(&frame, 0, below, 3, passed); /* within the bias; behind it; farther behind */
+        CHECK(passed[0] >= 1 && passed[1] <= 0 && passed[2] <= 0);
+    }
+    l.convention = 0;
+    ssdgs__let_pass(&frame, 0, beside, 2, passed); /* beside the map, behind the light */
+    CHECK(passed[0] >= 1 && passed[1] >= 1);
+    double last = 0; /* across the plate's edge it goes up without a jump */
+    int between = 0, down = 0;
+    for (int i = 0; i <= 400; i++) {
+        const ssdgs_real at[3] = {(ssdgs_real)(-0.6 - 0.001 * i), 0, 0};
+        ssdgs__let_pass(&frame, 0, at, 1, passed);
+        between += passed[0] > 0 && passed[0] < 1;
+        down += (double)passed[0] < last - 1e-6 || (double)passed[0] > last + 0.1;
+        last = (double)passed[0];
+    }
+    CHECK(between > 20 && !down && last >= 1);
+    maps->width = maps->height = 1; /* one pixel, which the plate has */
+    *depth = depth[MAP * MAP / 2 + MAP / 2];
+    ssdgs__let_pass(&frame, 0, below, 3, passed);
+    CHECK(passed[1] <= 0 && passed[2] <= 0);
+    *depth = 1; /* nothing as far as the map goes, so nothing beyond */
+    ssdgs_real far_off[3];
+    for (int c = 0; c < 3; c++) far_off[c] = (ssdgs_real)(l.eye[c] + 12 * l.ahead[c]);
+    ssdgs__let_pass(&frame, 0, far_off, 1, passed);
+    CHECK(passed[0] >= 1);
+    maps->width = maps->height = MAP;
+    for (int i = 0; i < MAP * MAP; i++) depth[i] = i % MAP ? 0 : 1; /* the first column is light */
+    for (int c = 0; c < 3; c++)
+        far_off[c] = (ssdgs_real)(l.eye[c] + l.ahead[c] - 0.997 * l.wide * l.right[c]);
+    ssdgs__let_pass(&frame, 0, far_off, 1, passed);
+    CHECK(passed[0] >= 1 && passed[0] <= 1);
+    maps->width = maps->height = 1;
+    for (int i = 0; i < 3; i++) { /* what is not a depth hides nothing */
+        *depth = (float)(i ? i > 1 ? INFINITY : 7 : NAN);
+        ssdgs__let_pass(&frame, 0, below, 3, passed);
+        CHECK(passed[0] >= 1 && passed[1] >= 1 && passed[2] >= 1);
+    }
+    make_shadow_map(&l, maps + 1, depth);
+    l.wide = 0.1; /* a cascade: the first map that has a place decides */
+    make_shadow_map(&l, maps, other_depth);
+    for (int i = 0; i < MAP * MAP; i++) other_depth[i] = 1;
+    occluder.map_count = 2;
+    const ssdgs_real both[6] = {0, 0, 0, (ssdgs_real)-0.25, 0, 0};
+    ssdgs__let_pass(&frame, 0, both, 2, passed);
+    CHECK(passed[0] >= 1 && passed[1] <= 0);
+}
+
+/* Exactly what the plate takes. */
+static looking plate_light;
+static void of_plate(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    (void)user;
+    for (int i = 0; i < count && !light; i++) {
+        double edge;
+        const double at[3] = {(double)points[3 * i], (double)points[3 * i + 1], (double)points[3 * i + 2]};
+        if (plate_hides(&plate_light, at, &edge)) fraction[i] = 0;
+    }
+}
+
+/* A frame by a shadow map is one by a callback that knows the plate; what is kept stays until that light's
+   map changes; what is not sound is refused. */
+static void test_shadow_map_frames(void) {
+    static float depth[MAP * MAP];
+    const ssdgs_camera camera = camera_from(0, -2.2, 0.3);
+    const ssdgs_light lights[2] = {point_light(0.3, 0, 3), point_light(2, -2, 1)};
+    ssdgs_settings s = small_settings();
+    s.light_map.size = 256;
+    ssdgs_model *ball = cloud(&s, 0, 300, 0.5);
+    const ssdgs_object object = placed(ball, 0.4, 1, 0, 0.1, 0, -0.2);
+    const looking from = {{0.3, 0, 3}, {1, 0, 0}, {0, 1, 0}, {0, 0, -1}, 0.4, 0};
+    ssdgs_shadow_map map;
+    ssdgs_occluder occluder = {of_plate, NULL, 1, NULL, 0};
+    plate_light = from;
+    together(&object, 1, &camera, lights, 2, NULL, shot);
+    ssdgs_scene_occlude(scene, &occluder);
+    together(&object, 1, &camera, lights, 2, NULL, shot + 1);
+    make_shadow_map(&from, &map, depth);
+    occluder.shadow = NULL, occluder.maps = &map, occluder.map_count = 1;
+    ssdgs_scene_occlude(scene, &occluder);
+    together(&object, 1, &camera, lights, 2, NULL, shot + 2);
+    CHECK(shot[2].stats.lights_cached == 0); /* both had the callback's answers */
+    double darker = 0, norm = 0;
+    for (int i = 0; i < 3 * PIXELS; i++)
+        darker += fabs((double)(shot[1].value[i] - shot[0].value[i])), norm += fabs((double)shot[0].value[i]);
+    CHECK(darker > 0.05 * norm);
+    CHECK_L2(shot[2].value, shot[1].value, 3 * PIXELS, 0.05, "a shadow map for a callback");
+    for (int change = 0; change < 6; change++) {
+        if (change == 1) map.revision++;
+        if (change == 2) map.bias *= 2;
+        if (change == 3) map.matrix[3] *= (ssdgs_real)1.001;
+        if (change == 4) map.light = 1;
+        if (change == 5) occluder.map_count = 0;
+        ssdgs_scene_occlude(scene, &occluder);
+        together(&object, 1, &camera, lights, 2, NULL, shot + 2);
+        CHECK(shot[2].stats.lights_cached == (change == 0 ? 2 : change == 4 ? 0 : 1));
+    }
+    CHECK(same(shot, shot + 2));
+    make_shadow_map(&from, &map, depth);
+    for (int wrong = 0; wrong < 10; wrong++) {
+        ssdgs_shadow_map bad = map;
+        ssdgs_image image;
+        memset(&image, 0, sizeof image);
+        occluder.maps = wrong == 8 ? NULL : &bad, occluder.map_count = wrong == 9 ? -1 : 1;
+        if (wrong == 0) bad.width = 0;
+        if (wrong == 1) bad.height = 32769;
+        if (wrong == 2) bad.depth = NULL;
+        if (wrong == 3) bad.light = -1;
+        if (wrong == 4) bad.flags = 8;
+        if (wrong == 5) bad.bias = -1;
+        if (wrong == 6) bad.range = (ssdgs_real)INFINITY;
+        if (wrong == 7) bad.matrix[15] = (ssdgs_real)NAN;
+        ssdgs_scene_occlude(scene, &occluder);
+        CHECK(ssdgs_scene_render(scene, &object, 1, &camera, lights, 2, NULL, &image, NULL) ==
+              (wrong == 7 ? SSDGS_ERR_NONFINITE : SSDGS_ERR_ARGUMENT));
+        if (!CHECK(strstr(ssdgs_error_message(context), "shadow map") != NULL))
+            printf("    %s\n", ssdgs_error_message(context));
+    }
+    ssdgs_scene_occlude(scene, NULL);
+    ssdgs_model_destroy(ball);
 }
 
 /* A spot inside its cone is a point light, outside it is none, between them glTF's part of it. */
@@ -2324,6 +2566,8 @@ int main(void) {
     TEST_ROW("97", "levels of detail", test_levels());
     test_query();
     test_occluder();
+    test_shadow_maps();
+    test_shadow_map_frames();
     test_ahead();
     test_spot();
     test_bounds();
