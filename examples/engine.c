@@ -398,7 +398,7 @@ static void load_model(void *loads, int index) {
 }
 
 static ssdgs_result open_level(level *l, const char *const models[2]) {
-    const ssdgs_occluder meshes = {NULL, NULL, 0, l->maps, CASTING};
+    ssdgs_occluder meshes;
     const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
     load loads[2];
     memcpy(l->box_low, low, sizeof low);
@@ -421,6 +421,9 @@ static ssdgs_result open_level(level *l, const char *const models[2]) {
     }
     if (!result) result = ssdgs_scene_create(l->context, &l->scene);
     if (result) return result;
+    memset(&meshes, 0, sizeof meshes); /* no function of ours: the maps say it */
+    meshes.maps = l->maps;
+    meshes.map_count = CASTING;
     ssdgs_scene_occlude(l->scene, &meshes);
     l->light_scale = ssdgs_model_settings(l->models[0])->light_scale;
     return SSDGS_OK;
