@@ -1192,7 +1192,7 @@ static void measure_gpu(bench *b) {
                      sizes[3][2] = {{256, 256}, {800, 800}, {1920, 1080}};
     static const char *const stages[] = {"project", "sort", "bin", "walk", "shade", "composite"};
     char message[256];
-    gpu *device = gpu_create(message, sizeof message);
+    gpu *device = gpu_create(NULL, message, sizeof message);
     if (!device) die("--gpu", message);
     printf(
         "%s beside %s; milliseconds a frame, each from another camera, default options\n"

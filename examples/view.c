@@ -58,7 +58,7 @@ int main(int argc, char **argv) {
     desc.tracer.user = &s.show;
     desc.logger.write = olat_hear;
     desc.logger.user = program;
-    gpu *const device = wants_gpu ? gpu_create(error, sizeof error) : NULL;
+    gpu *const device = wants_gpu ? gpu_create(NULL, error, sizeof error) : NULL;
     ssdgs_gpu_hook hook;
     if (device) {
         hook = gpu_hook(device);

@@ -9,7 +9,23 @@
 
 static gpu *device;
 
-/* ---- SHADE, and COMPOSITE's highlights ---- */
+/* ---- SHADE and COMPOSITE ---- */
+
+static void *downloaded(const gpu_buffer *b, size_t size) {
+    void *data = malloc(size + 1);
+    if (!data) exit(1);
+    gpu_download(device, b, data, size);
+    return data;
+}
+
+/* What was there before must not be what a stage is thought to have written. */
+static void spoil(gpu_buffer *b, size_t size) {
+    void *data = malloc(size + 1);
+    if (!data) exit(1);
+    memset(data, 0x5A, size);
+    gpu_upload(device, b, data, size);
+    free(data);
+}
 
 enum { LIGHTS = 6 };
 static double worst_plane; /* error, relative to the largest value */
@@ -25,14 +41,24 @@ static void begin(ssdgs_frame *frame, ssdgs_model *model, const ssdgs_light *lig
     }
 }
 
-/* What SHADE finds: seen, and of 256 at a time how many are and the first that is skipped. */
+/* A frame's views are all at work. */
+static gpu_set *all_at_work(const ssdgs_frame *frame) {
+    uint32_t views[GPU_VIEWS];
+    for (int i = 0; i < frame->view_count; i++) views[i] = (uint32_t)i;
+    gpu_enter(device);
+    gpu_set_frame(device, frame);
+    gpu_set_work(device, frame, views, frame->view_count);
+    return &device->frame.camera;
+}
+
+/* What SHADE finds: seen, and of 64 at a time how many are and the first that is skipped. */
 static void upload_seen(const uint32_t *seen, size_t n) {
-    const size_t groups = gpu_groups(n);
+    const size_t groups = (n + 63) / 64;
     uint32_t(*tally)[2] = (uint32_t(*)[2])malloc(groups * sizeof *tally);
     for (size_t i = 0; i < groups; i++) tally[i][0] = 0, tally[i][1] = UINT32_MAX;
     for (size_t i = n; i--;) {
-        tally[i / 256][0] += seen[i] == SSDGS_SEEN;
-        if (seen[i] == SSDGS_SKIPPED) tally[i / 256][1] = (uint32_t)i;
+        tally[i / 64][0] += seen[i] == SSDGS_SEEN;
+        if (seen[i] == SSDGS_SKIPPED) tally[i / 64][1] = (uint32_t)i;
     }
     gpu_upload(device, &device->frame.seen, seen, n * sizeof *seen);
     gpu_upload(device, &device->frame.tally, tally, groups * sizeof *tally);
@@ -47,20 +73,16 @@ static void upload_walk(const ssdgs_frame *frame) {
             frame->visibility[i] = NAN;
             if (frame->depth_cue) frame->depth_cue[i] = NAN;
         }
-    const ssdgs_model_view *v = &frame->objects->gaussians;
     gpu_frame *f = &device->frame;
     uint32_t *seen = (uint32_t *)malloc(n * sizeof *seen);
+    all_at_work(frame);
     for (size_t i = 0; i < n; i++) seen[i] = frame->seen[i];
     upload_seen(seen, n);
-    gpu_upload(device, &f->gaussians, v->gaussians, SSDGS_CHANNELS * v->stride * sizeof(float));
-    gpu_upload_networks(device, frame->objects);
-    gpu_upload_sky_shares(device, frame->objects);
     gpu_upload(device, &f->visibility, frame->visibility, all);
     if (frame->depth_cue) gpu_upload(device, &f->depth_cue, frame->depth_cue, all);
     if (frame->flux) gpu_upload(device, &f->flux, frame->flux, all);
     gpu_upload(device, &f->camera.depth, frame->views[0].depth, n * sizeof(float));
-    gpu_upload_lamps(device, frame);
-    for (int i = 0; i < f->lights; i++) f->light[i].ready = 0;
+    for (int i = 0; i < GPU_LAMPS; i++) f->light[i].ready = 0;
     free(seen);
 }
 
@@ -90,16 +112,15 @@ static void shade(ssdgs_model *model, const ssdgs_light *lights, int light_count
     begin(&frame, model, lights, light_count, options, 0, SSDGS_STAGE_WALK);
     const size_t n = (size_t)frame.count, size = 4 * n * sizeof(float);
     float *color = (float *)malloc(size), *layers = (float *)malloc(size * (size_t)(frame.layer_count + 1));
-    uint32_t *shaded = (uint32_t *)malloc((n + 1) * sizeof *shaded),
+    uint32_t *shaded = (uint32_t *)malloc((n + 65) * sizeof *shaded),
              *seen = (uint32_t *)malloc(n * sizeof *seen);
     for (size_t i = 0; i < n && skip_all; i++)
         if (frame.seen[i]) frame.seen[i] = SSDGS_SKIPPED;
-    gpu_enter(device);
     upload_walk(&frame);
     gpu_shade(device, &frame);
-    gpu_download(device, &device->frame.color, color, size);
-    gpu_download(device, &device->frame.layers, layers, size * (size_t)frame.layer_count);
-    gpu_download(device, &device->frame.shaded, shaded, (n + 1) * sizeof *shaded);
+    gpu_download(device, &device->frame.layers, color, size);
+    gpu_download_at(device, &device->frame.layers, size, layers, size * (size_t)frame.layer_count);
+    gpu_download(device, &device->frame.shaded, shaded, ((n + 63) / 64 * 64 + 1) * sizeof *shaded);
     gpu_download(device, &device->frame.seen, seen, n * sizeof *seen);
     if (!test_check(!gpu_leave(device, "shade"), __FILE__, __LINE__, name))
         printf("    %s\n", device->message);
@@ -107,8 +128,10 @@ static void shade(ssdgs_model *model, const ssdgs_light *lights, int light_count
     int other = 0;
     for (size_t i = 0; i < n; i++) other += seen[i] != frame.seen[i];
     CHECK(!other);
-    if (CHECK(shaded[0] == (uint32_t)frame.shaded_count))
-        CHECK(!memcmp(shaded + 1, frame.shaded, shaded[0] * sizeof *shaded));
+    if (CHECK(shaded[0] == ((uint32_t)frame.shaded_count + 63) / 64 * 64))
+        CHECK(!memcmp(shaded + 1, frame.shaded, (size_t)frame.shaded_count * sizeof *shaded));
+    for (uint32_t i = (uint32_t)frame.shaded_count; i < shaded[0]; i++) other += shaded[1 + i] != UINT32_MAX;
+    CHECK(!other);
     compare_planes(&frame, color, frame.color, 1, name);
     compare_planes(&frame, layers, frame.layers, frame.layer_count, name);
     free(seen);
@@ -193,30 +216,58 @@ static void shade_odd(const ssdgs_light *lights) {
     ssdgs_model_destroy(model);
 }
 
-/* The list of what is seen, and the neighbours of what is skipped, of more than one group can add up at
-   once. */
+/* The list of what is seen, and the neighbours of what is skipped, of objects with more than one group can
+   add up at once, with a few, with all skipped, with none. */
 static void seen_list(void) {
-    enum { MANY = 70001 };
-    static uint32_t seen[MANY], shaded[MANY + 1], neighbours[MANY];
-    const size_t groups = gpu_groups(MANY);
-    uint32_t found = 0, wrong = 0;
+    enum { OBJECTS = 6, MANY = 70001 + 64 * 200 + 4 * 64 };
+    static const int counts[OBJECTS] = {130, 1, 70001, 64, 200, 77};
+    static uint32_t seen[MANY], shaded[MANY + 65], neighbours[MANY], of[MANY / 64 + 4];
+    uint32_t at = 1, wrong = 0, first = 0;
     gpu_frame *f = &device->frame;
-    for (uint32_t i = 0; i < MANY; i++) seen[i] = i < 500 ? i & 2 : (uint32_t)(3 * draw(i));
+    gpu_parameters *p = &device->p;
     gpu_enter(device);
-    upload_seen(seen, MANY);
+    gpu_reserve_tables(device, OBJECTS);
+    for (int o = 0; o < OBJECTS; o++) {
+        device->tables->objects[o].place[0] = (int32_t)first;
+        device->tables->objects[o].place[1] = counts[o];
+        for (uint32_t i = 0; i < (uint32_t)counts[o]; i++) {
+            const uint32_t any = i < 10 ? i & 2 : (uint32_t)(3 * draw(first + i));
+            seen[first + i] = o == 3 ? SSDGS_SKIPPED : o == 5 ? 0 : any;
+            of[(first + i) / 64] = (uint32_t)o;
+        }
+        p->count = first + (uint32_t)counts[o];
+        first = (p->count + 63) / 64 * 64;
+    }
+    p->blocks = (p->count + 63) / 64;
+    p->object_count = OBJECTS;
+    p->layers = 0;
+    gpu_upload_tables(device);
+    gpu_write_anew(device, &f->object_of, of, sizeof of);
+    upload_seen(seen, p->count);
+    const gpu_buffer *const buffers[] = {&f->seen,       &f->tally,  &f->of_object, &f->shaded,
+                                         &f->neighbours, &f->layers, &f->ahead,     NULL};
+    gpu_reserve(device, &f->facts, (GPU_VIEWS + GPU_TOTALS) * sizeof(gpu_fact));
     gpu_reserve(device, &f->shaded, sizeof shaded);
     gpu_reserve(device, &f->neighbours, sizeof neighbours);
-    gpu_seen_program(device, GPU_SEEN_LIST, MANY, 0, groups);
+    gpu_reserve(device, &f->of_object, OBJECTS * 2 * sizeof(uint32_t));
+    gpu_reserve(device, &f->ahead, p->blocks * sizeof(uint32_t));
+    gpu_run(device, GPU_SEEN_OBJECTS, p, buffers, OBJECTS);
+    gpu_run(device, GPU_SEEN_LIST, p, buffers, gpu_groups(p->count));
     gpu_download(device, &f->shaded, shaded, sizeof shaded);
-    gpu_download(device, &f->neighbours, neighbours, sizeof neighbours);
+    gpu_download(device, &f->neighbours, neighbours, p->count * sizeof *neighbours);
     CHECK(!gpu_leave(device, "seen"));
-    for (uint32_t i = 0; i < MANY; i++) {
-        wrong += seen[i] == SSDGS_SEEN && shaded[1 + found] != i;
-        wrong += seen[i] == SSDGS_SKIPPED && neighbours[i] != (found ? found - 1 : 0);
-        wrong += seen[i] != SSDGS_SKIPPED && neighbours[i] != UINT32_MAX;
-        found += seen[i] == SSDGS_SEEN;
+    for (int o = 0; o < OBJECTS; o++) {
+        const uint32_t from = (uint32_t)device->tables->objects[o].place[0], begin = at;
+        if (o == 3) seen[from] = SSDGS_SEEN; /* some colour is needed */
+        for (uint32_t i = from; i < from + (uint32_t)counts[o]; i++) {
+            wrong += seen[i] == SSDGS_SEEN && shaded[at] != i;
+            wrong += seen[i] == SSDGS_SKIPPED && neighbours[i] + 1 != (at > begin ? at - 1 : at);
+            wrong += seen[i] != SSDGS_SKIPPED && neighbours[i] != UINT32_MAX;
+            at += seen[i] == SSDGS_SEEN;
+        }
+        for (; (at - 1) % 64; at++) wrong += shaded[at] != UINT32_MAX;
     }
-    CHECK(shaded[0] == found && !wrong);
+    CHECK(shaded[0] == at - 1 && !wrong);
 }
 
 /* Transport against its sum in double: exact where all nodes are opened, else, relative to the largest sum,
@@ -236,7 +287,6 @@ static void transport(double detail, double bound) {
     ssdgs_frame frame;
     options.transport_detail = (ssdgs_real)detail;
     begin(&frame, model, &light, 1, &options, 0, SSDGS_STAGE_WALK);
-    gpu_enter(device);
     upload_walk(&frame);
     gpu_shade(device, &frame);
     float *got = (float *)malloc(GPU_LENGTHS * MANY * sizeof *got);
@@ -288,84 +338,127 @@ static void compare_pixels(const ssdgs_frame *frame, const float *got, const ssd
         printf("    %d of %d pixels differ, by %g at most\n", off, count * PIXELS, 3e-5 * worst);
 }
 
-/* The maps of a light's faces, one after the other, from the CPU. */
-static void upload_maps(const ssdgs_frame *frame, int light, gpu_light *to) {
-    uint32_t *map_tile = (uint32_t *)malloc(sizeof *map_tile);
-    ssdgs_light_pixel *map = (ssdgs_light_pixel *)malloc(sizeof *map);
-    size_t tiles = 0, used = 0;
-    for (const ssdgs_splat_view *v = frame->views; v < frame->views + frame->view_count; v++) {
-        if (v->light != light) continue;
-        const size_t more = gpu_tiles(v), before = used;
-        map_tile = (uint32_t *)realloc(map_tile, (tiles + more) * sizeof *map_tile);
-        for (size_t i = 0; i < more; i++)
-            map_tile[tiles + i] = v->map_tile[i] == UINT32_MAX ? UINT32_MAX : (uint32_t)used++;
-        map = (ssdgs_light_pixel *)realloc(map, (256 * used + 1) * sizeof *map);
-        memcpy(map + 256 * before, v->light_map, 256 * (used - before) * sizeof *map);
-        tiles += more;
+/* Lists of all views, one after the other, as the device has them. */
+static void upload_views(const ssdgs_frame *frame, gpu_set *to) {
+    const size_t n = (size_t)frame->count, slots = (size_t)frame->view_count;
+    size_t instances = 0, rooms = 0, tiles = 0, instance = 0, room = 0, tile = 0;
+    for (const ssdgs_splat_view *v = frame->views; v < frame->views + slots; v++)
+        instances += v->instances, rooms += v->instance_room, tiles += (size_t)gpu_tiles(v);
+    ssdgs_record *record = (ssdgs_record *)malloc(slots * n * sizeof *record);
+    float *depth = (float *)malloc(slots * n * sizeof *depth);
+    uint32_t *order = (uint32_t *)malloc(slots * n * sizeof *order);
+    ssdgs_instances *of = (ssdgs_instances *)malloc(slots * n * sizeof *of);
+    ssdgs_instance *in = (ssdgs_instance *)malloc((rooms + 1) * sizeof *in);
+    ssdgs_tile_entry *list = (ssdgs_tile_entry *)malloc((instances + 1) * sizeof *list);
+    uint32_t *start = (uint32_t *)malloc((tiles + 1) * sizeof *start);
+    gpu_fact *facts = (gpu_fact *)calloc(GPU_VIEWS + GPU_TOTALS, sizeof *facts);
+    if (!record || !depth || !order || !of || !in || !list || !start || !facts) exit(1);
+    for (size_t s = 0; s < slots; s++) {
+        const ssdgs_splat_view *v = frame->views + s;
+        size_t at = (size_t)v->visible;
+        memcpy(record + s * n, v->record, n * sizeof *record);
+        memcpy(depth + s * n, v->depth, n * sizeof *depth);
+        memcpy(order + s * n, v->order, at * sizeof *order);
+        for (size_t i = 0; i < n; i++) /* what is not drawn behind what is, as SORT does */
+            if (!(v->depth[i] >= 0)) order[s * n + at++] = (uint32_t)i;
+        CHECK(at == n);
+        for (size_t i = 0; i < n; i++) {
+            of[s * n + i] = v->of_gaussian[i];
+            of[s * n + i].first += (uint32_t)room;
+        }
+        for (size_t i = 0; i < v->instance_room; i++) {
+            in[room + i] = v->instance[i];
+            in[room + i].place += (uint32_t)instance;
+        }
+        memcpy(list + instance, v->tile_list, v->instances * sizeof *list);
+        for (int i = 0; i < gpu_tiles(v); i++) start[tile++] = (uint32_t)instance + v->tile_start[i];
+        instance += v->instances;
+        room += v->instance_room;
+        facts[s].visible = (uint32_t)v->visible;
+        facts[s].instances = (uint32_t)v->instances;
+        facts[s].nearest = (float)v->nearest;
     }
-    gpu_upload(device, &to->map_tile, map_tile, tiles * sizeof *map_tile);
-    gpu_upload(device, &to->light_map, map, 256 * used * sizeof *map);
-    free(map);
-    free(map_tile);
+    start[tiles] = (uint32_t)instances;
+    device->instance_room = rooms + 100;
+    gpu_upload(device, &device->frame.facts, facts, (GPU_VIEWS + GPU_TOTALS) * sizeof *facts);
+    gpu_upload(device, &to->record, record, slots * n * sizeof *record);
+    gpu_upload(device, &to->depth, depth, slots * n * sizeof *depth);
+    gpu_upload(device, &to->order, order, slots * n * sizeof *order);
+    gpu_upload(device, &to->of_gaussian, of, slots * n * sizeof *of);
+    gpu_upload(device, &to->instance, in, rooms * sizeof *in);
+    gpu_upload(device, &to->tile_list, list, instances * sizeof *list);
+    gpu_upload(device, &to->tile_start, start, (tiles + 1) * sizeof *start);
+    free(record), free(depth), free(order), free(of), free(in), free(list), free(start), free(facts);
 }
 
-/* Pixels lit, from the CPU's layers and maps. */
-static void highlights(const ssdgs_settings *settings, const ssdgs_light *lights, int light_count, int given,
-                       const char *name) {
+/* The lights' maps, from the CPU. */
+static void upload_maps(const ssdgs_frame *frame) {
+    for (int i = 1; i < frame->view_count; i++) {
+        const ssdgs_splat_view *v = frame->views + i;
+        const size_t at = (size_t)device->tables->views[i].of[1], tile = 256 * sizeof(ssdgs_light_pixel);
+        for (size_t t = 0; v->light_map && t < (size_t)gpu_tiles(v); t++) {
+            const ssdgs_light_pixel empty = {{-1, 0, 0}, {0, 0}, {0, 0}, 0};
+            const int nothing = v->map_tile[t] == UINT32_MAX;
+            gpu_write(device, &device->frame.maps.buffer, (at + t) * tile,
+                      nothing ? &empty : v->light_map + 256 * (size_t)v->map_tile[t],
+                      nothing ? sizeof empty : tile);
+        }
+    }
+}
+
+/* Pixels, with their parts, from the CPU's lists, colours, layers and maps. */
+static void composite(const ssdgs_settings *settings, const ssdgs_light *lights, int light_count,
+                      const char *name) {
     const ssdgs_render_options options = ssdgs_render_options_default();
     ssdgs_model *model = cloud(settings, 0, 300, 0.5);
     ssdgs_frame frame;
-    begin(&frame, model, lights, light_count, &options, 1, SSDGS_STAGE_COMPOSITE);
-    const size_t size = PIXELS * sizeof(float), all = size * (size_t)light_count;
-    gpu_light maps[LIGHTS];
-    gpu_frame *f = &device->frame;
-    float *pixels = (float *)malloc(3 * size), *visibility = (float *)malloc(all),
-          *shadow = (float *)malloc(all);
-    gpu_fact *facts = (gpu_fact *)calloc((size_t)frame.view_count, sizeof *facts);
-    gpu_light *const own = f->light;
-    const int own_count = f->lights;
-    memset(maps, 0, sizeof maps);
-    for (int i = 0; i < frame.view_count; i++) facts[i].nearest = (float)frame.views[i].nearest;
-    for (size_t i = 0; given && i < PIXELS * (size_t)light_count; i++)
-        frame.pixel_visibility[i] = (ssdgs_real)draw(i);
-    frame.visibility_given = given;
-    if (given) CHECK(!ssdgs_stage_cpu(&frame, SSDGS_STAGE_COMPOSITE));
-    gpu_enter(device);
-    f->light = maps, f->lights = LIGHTS;
-    gpu_upload(device, &f->layer_pixels, frame.layer_pixels, 3 * size * (size_t)(frame.layer_count + 1));
-    gpu_upload(device, &f->facts, facts, (size_t)frame.view_count * sizeof *facts);
-    gpu_upload_lamps(device, &frame);
-    gpu_upload_faces(device, &frame);
-    for (int i = 0; i < light_count; i++) upload_maps(&frame, i, maps + i);
-    gpu_highlights(device, &frame);
-    gpu_download(device, &f->pixels, pixels, 3 * size);
-    gpu_download(device, &f->pixel_visibility, visibility, all);
-    gpu_download(device, &f->pixel_shadow, shadow, all);
-    f->light = own, f->lights = own_count;
-    if (!test_check(!gpu_leave(device, "highlights"), __FILE__, __LINE__, name))
+    const int parts = settings->asg == SSDGS_ASG_DEFERRED;
+    begin(&frame, model, lights, light_count, &options, parts, SSDGS_STAGE_COMPOSITE);
+    const size_t n = (size_t)frame.count, layers = (size_t)frame.layer_count + 1,
+                 size = PIXELS * sizeof(float), planes = gpu_planes(&frame);
+    float *layer = (float *)malloc(layers * n * 4 * sizeof *layer), *got = (float *)malloc(planes * size);
+    gpu_set *set = all_at_work(&frame);
+    upload_views(&frame, set);
+    upload_maps(&frame);
+    uint32_t *seen = (uint32_t *)malloc((frame.views->instances + 1) * sizeof *seen);
+    for (size_t i = 0; i < frame.views->instances; i++) seen[i] = frame.views->tile_seen[i];
+    gpu_upload(device, &set->tile_seen, seen, frame.views->instances * sizeof *seen);
+    memcpy(layer, frame.color, n * 4 * sizeof *layer);
+    if (parts) memcpy(layer + 4 * n, frame.layers, (layers - 1) * n * 4 * sizeof *layer);
+    gpu_upload(device, &device->frame.layers, layer, layers * n * 4 * sizeof *layer);
+    spoil(&device->frame.planes, planes * size);
+    gpu_composite(device, &frame);
+    gpu_download(device, &device->frame.planes, got, planes * size);
+    if (!test_check(!gpu_leave(device, "composite"), __FILE__, __LINE__, name))
         printf("    %s\n", device->message);
-    compare_pixels(&frame, pixels, frame.pixels, 3, name);
-    compare_pixels(&frame, visibility, frame.pixel_visibility, light_count, name);
-    compare_pixels(&frame, shadow, frame.pixel_shadow, light_count, name);
-    free(facts);
-    free(shadow);
-    free(visibility);
-    free(pixels);
+    compare_pixels(&frame, got, frame.pixels, 3, name);
+    CHECK_NEAR(got + 3 * PIXELS, frame.transmittance, PIXELS, 2e-6, 0, "transmittance");
+    if (parts) {
+        const float *part = got + 5 * PIXELS;
+        CHECK_NEAR(part, frame.layer_pixels, 3 * layers * PIXELS, 1e-5, 1e-5, "blended layers");
+        part += 3 * layers * PIXELS;
+        compare_pixels(&frame, part, frame.pixel_visibility, light_count, name);
+        compare_pixels(&frame, part + light_count * PIXELS, frame.pixel_shadow, light_count, name);
+    }
+    free(seen), free(layer), free(got);
     ssdgs_model_destroy(model);
 }
 
-static void all_highlights(const ssdgs_light *lights) {
+static void all_composites(const ssdgs_light *lights) {
     ssdgs_settings settings = small_settings();
     ssdgs_light inside = point_light(0.1, 0.1, -0.1);
-    highlights(&settings, lights, LIGHTS, 0, "highlights");
-    highlights(&settings, lights, 2, 1, "highlights, visibility given");
-    highlights(&settings, &inside, 1, 0, "highlights from within");
+    composite(&settings, lights, LIGHTS, "highlights");
+    composite(&settings, lights, 3, "three lights");
+    composite(&settings, &inside, 1, "highlights from within");
     settings.light_map.bias = (ssdgs_real)0.5;
-    highlights(&settings, lights, LIGHTS, 0, "highlights, a wide bias");
+    composite(&settings, lights, LIGHTS, "highlights, a wide bias");
     settings.shadow.layers = 0;
-    highlights(&settings, lights, 2, 0, "highlights, no shadow network");
+    composite(&settings, lights, 2, "highlights, no shadow network");
     settings.terms = SSDGS_DIFFUSE_TERM | SSDGS_SPECULAR_TERM;
-    highlights(&settings, lights, 2, 0, "highlights without shadow");
+    composite(&settings, lights, 2, "highlights without shadow");
+    settings = ssdgs_settings_published();
+    settings.scattering.width = settings.shadow.width = 16;
+    composite(&settings, lights, 1, "colours alone");
 }
 
 static void shades(void) {
@@ -389,7 +482,7 @@ static void shades(void) {
     shade_published(lights);
     shade_default(lights);
     shade_odd(lights);
-    all_highlights(lights);
+    all_composites(lights);
     printf("largest error of colours and layers: %.3g\n", worst_plane);
 }
 
@@ -403,6 +496,7 @@ typedef struct shooting {
     int light_count;
     ssdgs_render_options options;
     ssdgs_frame frame;
+    gpu_set *set; /* of all views */
 } shooting;
 
 static void shoot(shooting *s) {
@@ -465,31 +559,12 @@ static void begin_shooting(shooting *s, int which, int count) {
     put_oddities(s, which == 2);
     if (which == 0) s->options.max_error = (ssdgs_real)0.25;
     shoot(s);
-    gpu_enter(device);
-    gpu_reserve(device, &device->frame.facts, (size_t)s->frame.view_count * sizeof(gpu_fact));
-    gpu_upload(device, &device->frame.gaussians, s->frame.gaussians.gaussians,
-               s->frame.gaussians.stride * SSDGS_CHANNELS * sizeof(float));
+    s->set = all_at_work(&s->frame);
 }
 
 static void end_shooting(shooting *s, const char *name) {
     if (!CHECK(!gpu_leave(device, name))) printf("    %s: %s\n", name, device->message);
     ssdgs_model_destroy(s->model);
-}
-
-static void *downloaded(const gpu_buffer *b, size_t size) {
-    void *data = malloc(size + 1);
-    if (!data) exit(1);
-    gpu_download(device, b, data, size);
-    return data;
-}
-
-/* What was there before must not be what a stage is thought to have written. */
-static void spoil(gpu_buffer *b, size_t size) {
-    void *data = malloc(size + 1);
-    if (!data) exit(1);
-    memset(data, 0x5A, size);
-    gpu_upload(device, b, data, size);
-    free(data);
 }
 
 /* Buffers and failures. */
@@ -520,12 +595,15 @@ static void project(int which, int count) {
     shooting s;
     int all = 0;
     begin_shooting(&s, which, count);
+    gpu_project(device, s.set);
+    const size_t slots = (size_t)s.frame.view_count;
+    ssdgs_record *records =
+        (ssdgs_record *)downloaded(&s.set->record, slots * (size_t)count * sizeof *records);
+    float *depths = (float *)downloaded(&s.set->depth, slots * (size_t)count * sizeof *depths);
     for (int view = 0; view < s.frame.view_count; view++) {
         const ssdgs_splat_view *v = s.frame.views + view;
-        gpu_view *to = &device->frame.camera;
-        gpu_project_view(device, &s.frame, view, to);
-        ssdgs_record *record = (ssdgs_record *)downloaded(&to->record, (size_t)count * sizeof *record);
-        float *depth = (float *)downloaded(&to->depth, (size_t)count * sizeof *depth);
+        const ssdgs_record *record = records + view * count;
+        const float *depth = depths + view * count;
         int both = 0, other = 0;
         double most[4] = {0, 0, 0, 0};
         for (int i = 0; i < count; i++) {
@@ -552,9 +630,9 @@ static void project(int which, int count) {
         if (!CHECK(most[0] <= 1 && most[1] <= 1 && most[2] <= 1 && most[3] <= 1))
             printf("    scene %d, view %d: depth %.2g, centre %.2g, conic %.2g, the rest %.2g of the bound\n",
                    which, view, most[0], most[1], most[2], most[3]);
-        free(record);
-        free(depth);
     }
+    free(records);
+    free(depths);
     CHECK(all > count / 2);
     end_shooting(&s, "project");
 }
@@ -564,18 +642,25 @@ static void sort(int which, int count) {
     shooting s;
     int all = 0;
     begin_shooting(&s, which, count);
-    for (int view = 0; view < s.frame.view_count; view++) {
+    const size_t slots = (size_t)s.frame.view_count, n = (size_t)count;
+    float *depth = (float *)malloc(slots * n * sizeof *depth);
+    if (!depth) exit(1);
+    for (size_t view = 0; view < slots; view++) {
         ssdgs_splat_view *v = s.frame.views + view;
-        gpu_view *to = &device->frame.camera;
         for (int i = 3; i < count; i += 7) v->depth[i] = v->depth[i - 3]; /* ties */
-        CHECK(!ssdgs_stage_cpu(&s.frame, SSDGS_STAGE_SORT));
-        gpu_upload(device, &to->depth, v->depth, (size_t)count * sizeof(float));
-        gpu_sort_view(device, &s.frame, view, to);
-        uint32_t *order = (uint32_t *)downloaded(&to->order, (size_t)v->visible * sizeof *order);
-        all += v->visible;
-        CHECK(!memcmp(order, v->order, (size_t)v->visible * sizeof *order));
-        free(order);
+        memcpy(depth + view * n, v->depth, n * sizeof *depth);
     }
+    CHECK(!ssdgs_stage_cpu(&s.frame, SSDGS_STAGE_SORT));
+    gpu_upload(device, &s.set->depth, depth, slots * n * sizeof *depth);
+    gpu_sort(device, s.set);
+    uint32_t *order = (uint32_t *)downloaded(&s.set->order, slots * n * sizeof *order);
+    for (size_t view = 0; view < slots; view++) {
+        const ssdgs_splat_view *v = s.frame.views + view;
+        all += v->visible;
+        CHECK(!memcmp(order + view * n, v->order, (size_t)v->visible * sizeof *order));
+    }
+    free(order);
+    free(depth);
     CHECK(all > count / 2);
     end_shooting(&s, "sort");
 }
@@ -584,55 +669,33 @@ static void sort(int which, int count) {
 static void sort_nothing(void) {
     shooting s;
     begin_shooting(&s, 0, 300);
-    gpu_view *to = &device->frame.camera;
-    for (int i = 0; i < 300; i++) s.frame.views->depth[i] = -1;
-    gpu_upload(device, &to->depth, s.frame.views->depth, 300 * sizeof(float));
-    gpu_sort_view(device, &s.frame, 0, to);
-    gpu_upload(device, &to->record, s.frame.views->record, 300 * sizeof(ssdgs_record));
+    const size_t slots = (size_t)s.frame.view_count;
+    float *depth = (float *)malloc(slots * 300 * sizeof *depth);
+    if (!depth) exit(1);
+    for (size_t i = 0; i < slots * 300; i++) depth[i] = -1;
+    gpu_reserve(device, &s.set->record, slots * 300 * sizeof(ssdgs_record));
+    gpu_upload(device, &s.set->depth, depth, slots * 300 * sizeof(float));
+    gpu_sort(device, s.set);
     device->instance_room = 100;
-    spoil(&device->frame.facts, sizeof(gpu_fact));
-    gpu_bin_view(device, &s.frame, 0, to);
-    gpu_fact *facts = (gpu_fact *)downloaded(&device->frame.facts, sizeof *facts);
-    CHECK(facts->visible == 0 && facts->nearest <= 0 && facts->nearest >= 0);
+    spoil(&device->frame.facts, (GPU_VIEWS + GPU_TOTALS) * sizeof(gpu_fact));
+    gpu_bin(device, s.set);
+    gpu_fact *facts = (gpu_fact *)downloaded(&device->frame.facts, (GPU_VIEWS + GPU_TOTALS) * sizeof *facts);
+    for (size_t i = 0; i < slots; i++)
+        CHECK(facts[i].visible == 0 && facts[i].instances == 0 && facts[i].nearest <= 0 &&
+              facts[i].nearest >= 0);
+    CHECK(facts[GPU_VIEWS].instances == 0);
     free(facts);
-    const size_t tiles = gpu_tiles(s.frame.views);
-    uint32_t *start = (uint32_t *)downloaded(&to->tile_start, (tiles + 1) * sizeof *start);
-    ssdgs_instances *of = (ssdgs_instances *)downloaded(&to->of_gaussian, 300 * sizeof *of);
+    free(depth);
+    const size_t tiles = device->p.tiles;
+    uint32_t *start = (uint32_t *)downloaded(&s.set->tile_start, (tiles + 1) * sizeof *start);
+    ssdgs_instances *of = (ssdgs_instances *)downloaded(&s.set->of_gaussian, slots * 300 * sizeof *of);
     uint32_t any = 0;
     for (size_t i = 0; i <= tiles; i++) any |= start[i];
-    for (int i = 0; i < 300; i++) any |= of[i].count;
+    for (size_t i = 0; i < slots * 300; i++) any |= of[i].count;
     CHECK(!any);
     free(start);
     free(of);
     end_shooting(&s, "nothing");
-}
-
-static void upload_view(const ssdgs_frame *frame, int view, gpu_view *to) {
-    const ssdgs_splat_view *v = frame->views + view;
-    const size_t n = (size_t)frame->count;
-    gpu_fact *facts = (gpu_fact *)calloc((size_t)frame->view_count, sizeof *facts);
-    if (!facts) exit(1);
-    facts[view].visible = (uint32_t)v->visible;
-    facts[view].instances = (uint32_t)v->instances;
-    facts[view].nearest = (float)v->nearest;
-    gpu_upload(device, &device->frame.facts, facts, (size_t)frame->view_count * sizeof *facts);
-    free(facts);
-    gpu_upload(device, &to->record, v->record, n * sizeof(ssdgs_record));
-    gpu_upload(device, &to->depth, v->depth, n * sizeof(float));
-    gpu_reserve(device, &to->order, n * sizeof(uint32_t));
-    uint32_t *order = (uint32_t *)malloc(n * sizeof *order); /* the rest after what is drawn, as SORT does */
-    if (!order) exit(1);
-    size_t at = (size_t)v->visible;
-    memcpy(order, v->order, at * sizeof *order);
-    for (size_t i = 0; i < n; i++)
-        if (!(v->depth[i] >= 0)) order[at++] = (uint32_t)i;
-    CHECK(at == n);
-    gpu_upload(device, &to->order, order, n * sizeof *order);
-    free(order);
-    gpu_upload(device, &to->of_gaussian, v->of_gaussian, n * sizeof(ssdgs_instances));
-    gpu_upload(device, &to->instance, v->instance, v->instance_room * sizeof(ssdgs_instance));
-    gpu_upload(device, &to->tile_list, v->tile_list, v->instances * sizeof(ssdgs_tile_entry));
-    gpu_upload(device, &to->tile_start, v->tile_start, (gpu_tiles(v) + 1) * sizeof(uint32_t));
 }
 
 /* From the CPU's records and order: the same lists, but for entries whose exponent is at the threshold up to
@@ -641,27 +704,29 @@ static void bin(int which, int count) {
     shooting s;
     size_t all = 0;
     begin_shooting(&s, which, count);
-    for (int view = 0; view < s.frame.view_count; view++) {
+    upload_views(&s.frame, s.set);
+    const size_t slots = (size_t)s.frame.view_count, n = (size_t)count;
+    spoil(&s.set->tile_start, ((size_t)device->p.tiles + 1) * sizeof(uint32_t));
+    spoil(&device->frame.facts, (GPU_VIEWS + GPU_TOTALS) * sizeof(gpu_fact));
+    gpu_bin(device, s.set);
+    gpu_fact *facts = (gpu_fact *)downloaded(&device->frame.facts, (GPU_VIEWS + GPU_TOTALS) * sizeof *facts);
+    const size_t instances = facts[GPU_VIEWS].instances;
+    ssdgs_instance *instance =
+        (ssdgs_instance *)downloaded(&s.set->instance, instances * sizeof(ssdgs_instance));
+    ssdgs_tile_entry *list =
+        (ssdgs_tile_entry *)downloaded(&s.set->tile_list, instances * sizeof(ssdgs_tile_entry));
+    uint32_t *starts =
+        (uint32_t *)downloaded(&s.set->tile_start, ((size_t)device->p.tiles + 1) * sizeof(uint32_t));
+    ssdgs_instances *ofs = (ssdgs_instances *)downloaded(&s.set->of_gaussian, slots * n * sizeof *ofs);
+    for (size_t view = 0, first_tile = 0, counted = 0; view < slots; view++) {
         const ssdgs_splat_view *v = s.frame.views + view;
-        gpu_view *to = &device->frame.camera;
-        const size_t tiles = gpu_tiles(v), n = (size_t)count;
-        upload_view(&s.frame, view, to);
-        device->instance_room = v->instances + 100;
-        spoil(&to->tile_start, (tiles + 1) * sizeof(uint32_t));
-        spoil(&device->frame.facts, (size_t)(view + 1) * sizeof(gpu_fact));
-        gpu_bin_view(device, &s.frame, view, to);
-        gpu_fact *facts = (gpu_fact *)downloaded(&device->frame.facts, (size_t)(view + 1) * sizeof *facts);
+        const size_t tiles = (size_t)gpu_tiles(v);
+        const uint32_t *start = starts + first_tile;
+        const ssdgs_instances *of = ofs + view * n;
         CHECK(facts[view].visible == (uint32_t)v->visible);
         CHECK(!memcmp(&facts[view].nearest, &v->nearest, sizeof v->nearest));
-        const size_t instances = facts[view].instances;
-        ssdgs_instance *instance =
-            (ssdgs_instance *)downloaded(&to->instance, instances * sizeof(ssdgs_instance));
-        ssdgs_tile_entry *list =
-            (ssdgs_tile_entry *)downloaded(&to->tile_list, instances * sizeof(ssdgs_tile_entry));
-        uint32_t *start = (uint32_t *)downloaded(&to->tile_start, (tiles + 1) * sizeof(uint32_t));
-        ssdgs_instances *of = (ssdgs_instances *)downloaded(&to->of_gaussian, n * sizeof *of);
         size_t missing = 0, extra = 0, bits = 0, other = 0,
-               wrong = start[0] != 0 || start[tiles] != instances;
+               wrong = start[0] != counted || start[tiles] != counted + facts[view].instances;
         for (size_t tile = 0; tile < tiles; tile++) { /* a merge of two lists in the same order */
             uint32_t a = start[tile], b = v->tile_start[tile];
             while (a < start[tile + 1] || b < v->tile_start[tile + 1]) {
@@ -687,16 +752,18 @@ static void bin(int which, int count) {
         size_t sum = 0;
         for (size_t g = 0; g < n; g++) sum += of[g].count;
         all += bits;
-        CHECK(sum == instances);
+        CHECK(sum == facts[view].instances);
+        counted += sum;
+        first_tile += tiles;
         if (!CHECK(wrong == 0 && missing + extra + other <= 1 + bits / 10000))
             printf("    scene %d, view %d: %d wrong, %d missing, %d more, %d masks differ of %d\n", which,
-                   view, (int)wrong, (int)missing, (int)extra, (int)other, (int)bits);
-        free(facts);
-        free(instance);
-        free(list);
-        free(start);
-        free(of);
+                   (int)view, (int)wrong, (int)missing, (int)extra, (int)other, (int)bits);
     }
+    free(facts);
+    free(instance);
+    free(list);
+    free(starts);
+    free(ofs);
     CHECK(all > (size_t)count);
     end_shooting(&s, "bin");
 }
@@ -731,17 +798,16 @@ static void walk_camera(int which, int count) {
     shooting s;
     begin_shooting(&s, which, count);
     const ssdgs_splat_view *v = s.frame.views;
-    gpu_view *to = &device->frame.camera;
-    const size_t n = (size_t)count;
-    upload_view(&s.frame, 0, to);
-    device->instance_room = v->instance_room;
+    gpu_set *to = s.set;
+    const size_t n = (size_t)count, groups = (n + 63) / 64;
+    upload_views(&s.frame, to);
     spoil(&to->tile_seen, v->instances * sizeof(uint32_t));
     spoil(&to->tile_needed, v->instances * sizeof(uint32_t));
-    gpu_walk_camera_view(device, &s.frame, to);
+    gpu_walk_camera(device, to);
     uint32_t *blends = (uint32_t *)downloaded(&to->tile_seen, v->instances * sizeof *blends);
     uint32_t *needed = (uint32_t *)downloaded(&to->tile_needed, v->instances * sizeof *needed);
     uint32_t *seen = (uint32_t *)downloaded(&device->frame.seen, n * sizeof *seen);
-    uint32_t(*tally)[2] = (uint32_t(*)[2])downloaded(&device->frame.tally, gpu_groups(n) * sizeof *tally);
+    uint32_t(*tally)[2] = (uint32_t(*)[2])downloaded(&device->frame.tally, groups * sizeof *tally);
     size_t other = 0, mine = 0, theirs = 0, differ = 0, wrong = 0, all = 0;
     for (size_t i = 0; i < v->instances; i++) {
         all += v->tile_seen[i] != 0;
@@ -758,8 +824,8 @@ static void walk_camera(int which, int count) {
         wrong += seen[g] != (uint32_t)(is_needed ? SSDGS_SEEN : is_seen ? SSDGS_SKIPPED : 0);
         mine += seen[g] == SSDGS_SEEN;
         skipped = skipped != UINT32_MAX || seen[g] != SSDGS_SKIPPED ? skipped : (uint32_t)g;
-        if (g % 256 == 255 || g == n - 1) {
-            wrong += tally[g / 256][0] != (uint32_t)mine - before || tally[g / 256][1] != skipped;
+        if (g % 64 == 63 || g == n - 1) {
+            wrong += tally[g / 64][0] != (uint32_t)mine - before || tally[g / 64][1] != skipped;
             before = (uint32_t)mine, skipped = UINT32_MAX;
         }
         theirs += s.frame.seen[g] == SSDGS_SEEN;
@@ -783,18 +849,18 @@ static void walk_camera(int which, int count) {
 }
 
 /* A map's pixels say the same, but for falls at a level up to rounding. */
-static size_t compare_maps(const ssdgs_frame *frame, int view, const ssdgs_light_pixel *pixel,
-                           const uint32_t *map_tile, double stop) {
+static size_t compare_maps(const ssdgs_frame *frame, int view, const ssdgs_light_pixel *pixel, double stop) {
     const ssdgs_splat_view *v = frame->views + view;
     size_t all = 0, other = 0, falls = 0, empty = 0;
     double most = 0;
-    for (size_t tile = 0; tile < gpu_tiles(v); tile++) {
-        if (map_tile[tile] == UINT32_MAX || v->map_tile[tile] == UINT32_MAX) {
-            empty += map_tile[tile] != v->map_tile[tile];
+    for (size_t tile = 0; tile < (size_t)gpu_tiles(v); tile++) {
+        const int nothing = pixel[256 * tile].distance[0] < 0;
+        if (nothing || v->map_tile[tile] == UINT32_MAX) {
+            empty += !nothing || v->map_tile[tile] != UINT32_MAX;
             continue;
         }
         for (size_t i = 0; i < 256; i++) {
-            const ssdgs_light_pixel *a = pixel + 256 * (size_t)map_tile[tile] + i,
+            const ssdgs_light_pixel *a = pixel + 256 * tile + i,
                                     *b = v->light_map + 256 * (size_t)v->map_tile[tile] + i;
             int same = 1;
             for (int l = 0; l < 3; l++) {
@@ -824,7 +890,6 @@ static void walk_light(int which, int count) {
     shooting s;
     begin_shooting(&s, which, count);
     const size_t n = (size_t)count;
-    gpu_view *to = &device->frame.face;
     const double stop = (double)s.options.stop;
     size_t falls = 0;
     ssdgs_real *flux = (ssdgs_real *)calloc(n * (size_t)s.light_count, sizeof *flux);
@@ -832,24 +897,18 @@ static void walk_light(int which, int count) {
     s.frame.flux = flux;
     s.frame.maps = 1;
     CHECK(!ssdgs_stage_cpu(&s.frame, SSDGS_STAGE_WALK));
+    all_at_work(&s.frame);
+    upload_views(&s.frame, s.set);
+    spoil(&s.set->tile_sums, device->instance_room * 4 * sizeof(float));
+    gpu_walk_lights(device, s.set);
     for (int view = 1; view < s.frame.view_count; view++) {
-        const ssdgs_splat_view *v = s.frame.views + view;
-        upload_view(&s.frame, view, to);
-        device->instance_room = v->instance_room;
-        spoil(&to->tile_sums, v->instances * 4 * sizeof(float));
-        gpu_walk_light_view(device, &s.frame, view, to);
-        if (gpu_same_light(&s.frame, view, view + 1)) continue;
-        const size_t tiles = gpu_tiles(v);
-        int first = view;
-        while (gpu_same_light(&s.frame, view, first - 1)) first--;
-        const size_t faces = (size_t)(view - first) + 1;
-        const gpu_light *light = device->frame.light + v->light;
-        uint32_t *map_tile = (uint32_t *)downloaded(&light->map_tile, faces * tiles * sizeof *map_tile);
-        ssdgs_light_pixel *map =
-            (ssdgs_light_pixel *)downloaded(&light->light_map, faces * tiles * 256 * sizeof *map);
-        for (int face = first; face <= view; face++)
-            falls += compare_maps(&s.frame, face, map, map_tile + (size_t)(face - first) * tiles, stop);
-        free(map_tile);
+        const size_t tile = 256 * sizeof(ssdgs_light_pixel),
+                     size = (size_t)gpu_tiles(s.frame.views + view) * tile;
+        ssdgs_light_pixel *map = (ssdgs_light_pixel *)malloc(size);
+        if (!map) exit(1);
+        gpu_download_at(device, &device->frame.maps.buffer, (size_t)device->tables->views[view].of[1] * tile,
+                        map, size);
+        falls += compare_maps(&s.frame, view, map, stop);
         free(map);
     }
     CHECK(falls > 1000);
@@ -877,50 +936,6 @@ static void walk_light(int which, int count) {
     free(fluxes);
     free(flux);
     end_shooting(&s, "walk: light");
-}
-
-/* Pixels and layers from the CPU's colours and layers. */
-static void blend(int which, int count) {
-    shooting s;
-    begin_shooting(&s, which, count);
-    const size_t n = (size_t)count, pixels = PIXELS, layers = (size_t)s.frame.layer_count;
-    gpu_frame *f = &device->frame;
-    gpu_view *to = &f->camera;
-    ssdgs_real *layer_pixels = (ssdgs_real *)calloc((layers + 1) * 3 * pixels, sizeof *layer_pixels);
-    ssdgs_real *planes = (ssdgs_real *)calloc((size_t)s.light_count * 2 * pixels, sizeof *planes);
-    if (!layer_pixels || !planes) exit(1);
-    if (layers) s.frame.layer_pixels = layer_pixels;
-    s.frame.pixel_visibility = planes;
-    s.frame.pixel_shadow = planes + (size_t)s.light_count * pixels;
-    CHECK(!ssdgs__run_stages(&s.frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE));
-    const ssdgs_splat_view *v = s.frame.views;
-    upload_view(&s.frame, 0, to);
-    uint32_t *seen = (uint32_t *)malloc((v->instances + 1) * sizeof *seen);
-    if (!seen) exit(1);
-    for (size_t i = 0; i < v->instances; i++) seen[i] = v->tile_seen[i];
-    gpu_upload(device, &to->tile_seen, seen, v->instances * sizeof *seen);
-    free(seen);
-    gpu_upload(device, &f->color, s.frame.color, n * 4 * sizeof(float));
-    gpu_upload(device, &f->layers, s.frame.layers, layers * n * 4 * sizeof(float));
-    spoil(&f->pixels, 3 * pixels * sizeof(float));
-    spoil(&f->transmittance, pixels * sizeof(float));
-    spoil(&f->layer_pixels, (layers + 1) * 3 * pixels * sizeof(float));
-    gpu_blend_all(device, &s.frame);
-    float *got = (float *)downloaded(&f->pixels, 3 * pixels * sizeof *got);
-    float *transmittance = (float *)downloaded(&f->transmittance, pixels * sizeof *transmittance);
-    CHECK_NEAR(got, layers ? layer_pixels : s.frame.pixels, 3 * pixels, 1e-5, 1e-5, "pixels");
-    CHECK_NEAR(transmittance, s.frame.transmittance, pixels, 2e-6, 0, "transmittance");
-    free(got);
-    free(transmittance);
-    if (layers) {
-        got = (float *)downloaded(&f->layer_pixels, (layers + 1) * 3 * pixels * sizeof *got);
-        CHECK_NEAR(got, layer_pixels, (layers + 1) * 3 * pixels, 1e-5, 1e-5, "blended layers");
-        free(got);
-    }
-    free(layer_pixels);
-    free(planes);
-    s.frame.layer_pixels = NULL;
-    end_shooting(&s, "blend");
 }
 
 /* ---- whole frames ---- */
@@ -990,42 +1005,151 @@ static void frame(int which, int count, int exact, double bound) {
     CHECK(shot[1].stats.instances > 0 && shot[1].stats.light_instances > 0);
 }
 
-/* What the backend leaves to the CPU is the CPU's to the bit: several objects, one that is turned, moved,
-   tinted or rougher, components. */
+/* Takes a half of what is on one side. */
+static void half_of(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction) {
+    (void)user, (void)light;
+    for (int i = 0; i < count; i++)
+        if (points[3 * i] > 0) fraction[i] /= 2;
+}
+
+/* What the backend leaves to the CPU is the CPU's to the bit: an occluder's callback, parts where light is
+   not deferred, no Gaussian, more lights than it has room for, maps asked for. */
 static void left_to_the_cpu(void) {
-    enum { CASES = 6 };
+    enum { CASES = 4, MANY = GPU_LAMPS + 1 };
     static picture pictures[2][CASES];
+    static ssdgs_light lights[MANY];
     ssdgs_context *const own = context;
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     const ssdgs_gpu_hook hook = gpu_hook(device);
+    for (int i = 0; i < MANY; i++) lights[i] = point_light(2 + 0.1 * i, 3, 4);
     for (int i = 0; i < 2; i++) {
         desc.gpu = i ? &hook : NULL;
         if (!CHECK(!ssdgs_context_create(&desc, &context) && !ssdgs_scene_create(context, &scene))) exit(1);
-        const ssdgs_settings settings = small_settings();
-        ssdgs_model *model = cloud(&settings, 0, 200, 0.5);
-        const ssdgs_light light = point_light(2, 3, 4);
+        ssdgs_settings settings[2] = {small_settings(), ssdgs_settings_published()};
+        for (int m = 0; m < 2; m++) settings[m].scattering.width = settings[m].shadow.width = 16;
+        for (int m = 0; m < 2; m++) settings[m].light_map.size = 32;
+        ssdgs_model *models[2] = {cloud(settings, 0, 200, 0.5), cloud(settings + 1, 0, 200, 0.5)};
         const ssdgs_camera camera = camera_from(3, 0, 1);
+        ssdgs_occluder occluder;
+        memset(&occluder, 0, sizeof occluder);
+        occluder.shadow = half_of;
         for (int c = 0; c < CASES; c++) {
-            ssdgs_object objects[2] = {ssdgs_object_default(model), placed(model, 1, 1, 0, 0.5, 0.2, 0)};
+            const ssdgs_object object = ssdgs_object_default(models[c == 1]);
             picture *p = pictures[i] + c;
             ssdgs_image image = planes_of(p);
-            if (c)
-                image.diffuse = image.specular = image.scattering = image.normal = image.depth =
-                    image.shadow = NULL;
-            if (c == 1) objects[0] = placed(model, 1, 1, 0, 0, 0, 0);
-            if (c == 2) objects->to_world[3] = (ssdgs_real)0.1;
-            if (c == 3) objects->tint[1] = (ssdgs_real)0.5;
-            if (c == 4) objects->roughness = 2;
-            CHECK(!ssdgs_scene_render(scene, objects, c == 5 ? 2 : 1, &camera, &light, 1, NULL, &image,
-                                      &p->stats));
+            if (c == 3) image.diffuse = image.specular = image.scattering = image.normal = NULL;
+            ssdgs_scene_occlude(scene, c ? NULL : &occluder);
+            if (!CHECK(!ssdgs_scene_render(scene, &object, c != 2, &camera, lights, c == 3 ? MANY : 1, NULL,
+                                           &image, &p->stats)))
+                printf("    %s\n", ssdgs_error_message(context));
+            if (i) CHECK(!gpu_last_picture(device).buffer);
         }
-        ssdgs_model_destroy(model);
+        for (int m = 0; m < 2; m++) ssdgs_model_destroy(models[m]);
         ssdgs_scene_destroy(scene);
         ssdgs_context_destroy(context);
     }
     context = own;
     for (int c = 0; c < CASES; c++) CHECK(same(pictures[0] + c, pictures[1] + c));
+}
+
+/* Maps that are asked for ahead of a frame: the host has them, they are the frame's, and another scene's stay
+   apart. */
+static void asked_maps(void) {
+    enum { POINTS = 200 };
+    static picture pictures[2];
+    static ssdgs_real fraction[2][2][POINTS];
+    ssdgs_context *const own = context;
+    ssdgs_context_desc desc;
+    ssdgs_real points[3 * POINTS];
+    memset(&desc, 0, sizeof desc);
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    for (uint64_t i = 0; i < 3 * POINTS; i++) points[i] = (ssdgs_real)(2 * draw(i) - 1);
+    for (int i = 0; i < 2; i++) {
+        ssdgs_scene *other;
+        desc.gpu = i ? &hook : NULL;
+        if (!CHECK(!ssdgs_context_create(&desc, &context) && !ssdgs_scene_create(context, &scene) &&
+                   !ssdgs_scene_create(context, &other)))
+            exit(1);
+        const ssdgs_settings settings = small_settings();
+        ssdgs_model *model = cloud(&settings, 0, 400, 0.5);
+        const ssdgs_light lights[2] = {point_light(0.1, 0, -0.1), parallel_light(0.6, 0, 0.8)},
+                          *second = lights + 1;
+        const ssdgs_object objects[2] = {ssdgs_object_default(model), placed(model, 1, 0.5, 1, 0.4, 0.2, 0)};
+        const ssdgs_camera camera = camera_from(3, 0, 1);
+        ssdgs_image image = planes_of(pictures + i);
+        CHECK(!ssdgs_scene_light(scene, objects, 2, NULL, lights, 2, NULL));
+        CHECK(!ssdgs_scene_light(other, objects, 1, NULL, second, 1, NULL));
+        CHECK(!ssdgs_scene_shadow(scene, 0, points, POINTS, fraction[i][0]));
+        CHECK(!ssdgs_scene_shadow(scene, 1, points, POINTS, fraction[i][1]));
+        CHECK(!ssdgs_scene_light(scene, objects, 2, NULL, lights, 2, NULL));
+        CHECK(!ssdgs_scene_render(scene, objects, 2, &camera, lights, 2, NULL, &image, &pictures[i].stats));
+        if (i) CHECK(gpu_last_picture(device).buffer);
+        CHECK(pictures[i].stats.lights_cached == 2);
+        static ssdgs_real again[POINTS];
+        for (int light = 0; light < 2; light++) {
+            CHECK(!ssdgs_scene_shadow(scene, light, points, POINTS, again));
+            CHECK(!memcmp(again, fraction[i][light], sizeof again));
+        }
+        ssdgs_model_destroy(model);
+        ssdgs_scene_destroy(other);
+        ssdgs_scene_destroy(scene);
+        ssdgs_context_destroy(context);
+    }
+    context = own;
+    CHECK(device->host_map_count == 0);
+    for (int light = 0; light < 2; light++)
+        CHECK_NEAR(fraction[1][light], fraction[0][light], POINTS, 1e-3, 0, "maps asked for");
+    CHECK(between(pictures + 1, pictures).rms < 1e-3);
+}
+
+static int dispatched;
+static void (*own_dispatch)(uint32_t x, uint32_t y, uint32_t z);
+static void count_dispatch(uint32_t x, uint32_t y, uint32_t z) {
+    dispatched++;
+    own_dispatch(x, y, z);
+}
+
+/* The number of dispatches depends neither on objects nor on lights. */
+static void dispatches(void) {
+    ssdgs_context *const own = context;
+    ssdgs_context_desc desc;
+    int counts[3] = {0, 0, 0};
+    memset(&desc, 0, sizeof desc);
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    desc.gpu = &hook;
+    if (!CHECK(!ssdgs_context_create(&desc, &context) && !ssdgs_scene_create(context, &scene))) exit(1);
+    const ssdgs_settings settings = small_settings();
+    ssdgs_model *model = cloud(&settings, 0, 200, 0.4);
+    own_dispatch = device->gl.DispatchCompute;
+    device->gl.DispatchCompute = count_dispatch;
+    device->instance_room = 1 << 18;
+    for (int f = 0; f < 9; f++) { /* one object, one light; many; at rest */
+        const int many = f / 3 > 0, at = f / 3 > 1 ? 5 : f;
+        ssdgs_object objects[12];
+        ssdgs_light lights[6];
+        const ssdgs_camera camera = camera_from(3, 0.1 * at, 1);
+        ssdgs_image image;
+        memset(&image, 0, sizeof image);
+        image.color = shot->value;
+        for (int i = 0; i < 12; i++)
+            objects[i] = placed(model, i + at, 0.4, i % 3 == 0, 0.3 * (i % 4), 0.3 * (i / 4), 0);
+        for (int i = 0; i < 6; i++)
+            lights[i] = point_light(i == 3 ? 0.1 : 2 + 0.1 * at, i - 3, i == 3 ? 0 : 2);
+        dispatched = 0;
+        CHECK(!ssdgs_scene_render(scene, objects, many ? 12 : 1, &camera, lights, many ? 6 : 1, NULL, &image,
+                                  NULL));
+        CHECK(gpu_last_picture(device).buffer);
+        counts[f / 3] = dispatched;
+    }
+    device->gl.DispatchCompute = own_dispatch;
+    printf("dispatches a frame: %d with one object and light, %d with many, %d at rest\n", counts[0],
+           counts[1], counts[2]);
+    CHECK(counts[1] <= counts[0] + 2 && counts[2] < 8 && counts[0] < 30); /* 2: more than 256 tiles */
+    ssdgs_model_destroy(model);
+    ssdgs_scene_destroy(scene);
+    ssdgs_context_destroy(context);
+    context = own;
 }
 
 /* A trained model from two sides, under one light, then under two and the sky. */
@@ -1075,7 +1199,7 @@ static void trained(const char *path, int exact) {
 }
 
 /* Frames in turn, of which some keep what the last one has found, of two models, one of them now and then
-   with parts that the CPU draws: as the CPU's alone, and as much kept. */
+   with parts: as the CPU's alone, and as much kept. */
 static void kept(void) {
     enum { FRAMES = 14 };
     static picture pictures[2][FRAMES];
@@ -1119,7 +1243,7 @@ static void kept(void) {
     for (int f = 0; f < FRAMES; f++) {
         const ssdgs_render_stats *got = &pictures[1][f].stats, *want = &pictures[0][f].stats;
         const difference d = between(pictures[1] + f, pictures[0] + f);
-        const int anew = f == 5 || f == 6 || f == 12 || f == 13 || f == 9; /* in other memory than the last */
+        const int anew = f == 8 || f == 9; /* of another model than the last */
         if (!CHECK(d.rms < 1e-3 && d.far <= 3 * PIXELS / 1000)) printf("    frame %d: %g\n", f, d.rms);
         if (!anew &&
             !CHECK(got->camera_cached == want->camera_cached && got->lights_cached == want->lights_cached))
@@ -1131,6 +1255,265 @@ static void kept(void) {
     CHECK(pictures[0][1].stats.camera_cached && pictures[0][4].stats.lights_cached == 2);
     CHECK(!memcmp(pictures[1][0].value, pictures[1][1].value, 3 * PIXELS * sizeof(ssdgs_real)));
     CHECK(memcmp(pictures[1][3].value, pictures[1][4].value, 3 * PIXELS * sizeof(ssdgs_real)) != 0);
+}
+
+enum { MODELS = 6, PLACES = 5, MOST_LIGHTS = 4, MAP = 32 };
+
+/* A scene of many kinds of models under many kinds of lights. */
+typedef struct stage_set {
+    ssdgs_model *models[3][MODELS]; /* of each context */
+    int model[PLACES], count, light_count, deep, mapped, wide, plain, parts;
+    ssdgs_object objects[PLACES];
+    ssdgs_light lights[MOST_LIGHTS];
+    ssdgs_render_options options;
+    double eye[3];
+    unsigned char mask[400];
+    float depth[PIXELS], map_depth[MAP * MAP];
+    ssdgs_shadow_map map;
+    uint64_t drawn;
+} stage_set;
+
+static ssdgs_model *model_of(int kind) {
+    ssdgs_settings s = kind == 2 ? ssdgs_settings_published() : small_settings();
+    s.transfer = SSDGS_TRANSFER_SRGB;
+    s.light_map.size = kind == 1 ? 0 : 48;
+    s.scattering.width = s.shadow.width = kind == 1 ? 23 : 16;
+    if (kind == 3) s.baked = 1, s.harmonics = 3;
+    if (kind == 4) {
+        s.scattering.layers = s.shadow.layers = 0;
+        for (int c = 0; c < 3; c++)
+            s.medium.scattering[c] = (ssdgs_real)(10 + 5 * c), s.medium.absorption[c] = 1;
+    }
+    if (kind == 5) s.kept = (ssdgs_real)0.3, s.harmonics = 1;
+    ssdgs_model *model = cloud(&s, 700 * kind, 150 + 40 * kind, 0.4);
+    const ssdgs_model_view v = ssdgs_model_arrays(model);
+    for (size_t c = kind == 3 ? SSDGS_DIFFUSE : SSDGS_CHANNELS; c < (size_t)v.channels; c++)
+        for (size_t i = 0; i < (size_t)v.count; i++)
+            v.gaussians[c * v.stride + i] = (ssdgs_real)(draw(90000 + 700 * c + i) - 0.5);
+    if (kind == 1)
+        for (int i = 0; i < SSDGS_ASG_COUNT; i++) v.asg_sigma[i] += (ssdgs_real)(0.2 * i);
+    CHECK(!ssdgs_model_sort(model));
+    return model;
+}
+
+static double next(stage_set *s) { return draw(7000000 + s->drawn++); }
+static int pick(stage_set *s, int many) { return (int)(next(s) * many); }
+
+static void change_place(stage_set *s, int i) {
+    const double scale = 0.6 + 0.8 * next(s), turn = 6 * next(s);
+    const ssdgs_object there =
+        placed(NULL, turn, scale, pick(s, 4) == 0, 1.2 * next(s) - 0.6, 1.2 * next(s) - 0.6, next(s) - 0.5);
+    memcpy(s->objects[i].to_world, there.to_world, sizeof there.to_world);
+}
+
+static void change_look(stage_set *s, int i) {
+    ssdgs_object *o = s->objects + i;
+    for (int c = 0; c < 3; c++) o->tint[c] = (ssdgs_real)(pick(s, 2) ? 1 : 0.3 + next(s));
+    o->roughness = (ssdgs_real)(pick(s, 2) ? 1 : 0.5 + next(s));
+    o->specular = (ssdgs_real)(pick(s, 2) ? 1 : 2 * next(s));
+    o->translucency = (ssdgs_real)(pick(s, 3) ? 1 : 0.5 + next(s));
+    o->presence = (ssdgs_real)(pick(s, 3) ? 1 : next(s));
+    o->kept = (ssdgs_real)(pick(s, 2) ? 1 : next(s));
+    o->mask = pick(s, 3) ? NULL : s->mask;
+}
+
+static void change_light(stage_set *s, int i) {
+    double d[3];
+    direction_of(pick(s, 30), 60, d);
+    ssdgs_light *l = s->lights + i;
+    const int kind = pick(s, 6);
+    *l = kind == 1 ? parallel_light(d[0], d[1], d[2]) : point_light(2.5 * d[0], 2.5 * d[1], 2.5 * d[2]);
+    if (kind == 2) *l = point_light(0.2 * d[0], 0.2 * d[1], 0.2 * d[2]); /* within: six views */
+    if (kind == 3) l->range = (ssdgs_real)(2.2 + next(s));
+    if (kind > 3)
+        for (int c = 0; c < 3; c++) l->direction[c] = (ssdgs_real)-d[c];
+    if (kind == 4) l->kind = SSDGS_LIGHT_SPOT, l->cone[0] = (ssdgs_real)0.1, l->cone[1] = (ssdgs_real)0.2;
+    if (kind == 5) l->focus = 3;
+    l->unshadowed = pick(s, 6) == 0;
+    if (pick(s, 8) == 0) memset(l->intensity, 0, sizeof l->intensity);
+    l->kept = (ssdgs_real)(pick(s, 2) ? 0 : next(s));
+}
+
+/* A wall beside the light, which hides a half of what it shines on. */
+static void change_map(stage_set *s) {
+    const double side = next(s) - 0.5;
+    memset(&s->map, 0, sizeof s->map);
+    s->mapped = pick(s, 3);
+    s->map.light = pick(s, MOST_LIGHTS);
+    s->map.width = s->map.height = MAP;
+    s->map.depth = s->map_depth;
+    s->map.pitch = MAP * sizeof(float);
+    s->map.flags = pick(s, 2) ? SSDGS_CLIP_Z_FROM_0 : 0;
+    s->map.bias = (ssdgs_real)(0.01 * pick(s, 3));
+    s->map.revision++;
+    for (int i = 0; i < MAP * MAP; i++) s->map_depth[i] = i % MAP > MAP / 2 + 8 * side ? 0.4f : 1;
+    const double rows[16] = {0.5, 0.2, 0, 0, 0, 0.1, 0.5, 0, 0.1, 0, -0.2, 0.4, 0, 0, 0, 1};
+    for (int i = 0; i < 16; i++) s->map.matrix[i] = (ssdgs_real)rows[i];
+}
+
+static void change_depth(stage_set *s) {
+    const double edge = SIDE * next(s);
+    s->deep = pick(s, 2);
+    for (int i = 0; i < PIXELS; i++) s->depth[i] = i % SIDE < edge ? 0 : i % 7 ? 2.2f : (float)NAN;
+}
+
+static void change_options(stage_set *s) {
+    s->options = pick(s, 2) ? ssdgs_render_options_default() : ssdgs_render_options_exact();
+    s->options.antialias = pick(s, 2);
+    s->options.light_detail = (ssdgs_real)(pick(s, 3) ? 1 : 0.5);
+    for (int i = 0; i < 27; i++)
+        s->options.ambient[i / 3][i % 3] = (ssdgs_real)(s->drawn % 3 ? 0 : i < 3 ? 0.5 : 0.2 * next(s));
+}
+
+/* One of many small changes, or none. */
+static void change(stage_set *s) {
+    const int kind = pick(s, 14), place = pick(s, PLACES);
+    if (kind == 0) s->count = 1 + pick(s, PLACES);
+    if (kind == 1) s->model[place] = pick(s, MODELS);
+    if (kind == 2) change_place(s, place);
+    if (kind == 3) change_look(s, place);
+    if (kind == 4) change_light(s, pick(s, MOST_LIGHTS));
+    if (kind == 5) s->light_count = pick(s, MOST_LIGHTS + 1);
+    if (kind == 6) s->lights[pick(s, MOST_LIGHTS)].intensity[0] *= 2;
+    if (kind == 7) change_map(s);
+    if (kind == 8) change_depth(s);
+    if (kind == 9) change_options(s);
+    if (kind == 10) s->plain = pick(s, 3) == 0; /* a scene of plain splats alone */
+    if (kind == 11) s->parts = pick(s, 2);
+    for (int c = 0; c < 3 && kind > 11; c++) s->eye[c] = (c == 2 ? 1 : 2.2) + next(s) - 0.5;
+}
+
+/* A model is edited, or is another one in the same memory. */
+static void change_model(stage_set *s, ssdgs_context *const contexts[3]) {
+    const int which = pick(s, MODELS), gone = pick(s, 2), at = pick(s, 100);
+    for (int i = 0; i < 3; i++) {
+        context = contexts[i];
+        if (gone) {
+            ssdgs_model_destroy(s->models[i][which]);
+            s->models[i][which] = model_of(which);
+        }
+        const ssdgs_model_view v = ssdgs_model_arrays(s->models[i][which]);
+        v.gaussians[(SSDGS_LOG_SCALE + (size_t)at % 3) * v.stride + (size_t)at] += (ssdgs_real)0.5;
+    }
+}
+
+static ssdgs_result draw_set(stage_set *s, int which, ssdgs_scene *in, picture *p, ssdgs_real *median) {
+    const ssdgs_camera camera = camera_from(s->eye[0], s->eye[1], s->eye[2]);
+    ssdgs_occluder occluder;
+    ssdgs_object objects[PLACES];
+    ssdgs_image image = planes_of(p);
+    memset(&occluder, 0, sizeof occluder);
+    occluder.maps = &s->map, occluder.map_count = s->mapped > 0;
+    ssdgs_scene_occlude(in, &occluder);
+    for (int i = 0; i < s->count; i++) {
+        objects[i] = s->objects[i];
+        objects[i].model = s->models[which][s->plain ? 3 : s->model[i]];
+        objects[i].kept = s->plain && !(objects[i].kept > 0) ? 1 : objects[i].kept;
+    }
+    image.scene_depth = s->deep ? s->depth : NULL;
+    image.median_depth = median;
+    if (!s->parts)
+        image.diffuse = image.specular = image.scattering = image.normal = image.depth = image.shadow = NULL;
+    return ssdgs_scene_render(in, objects, s->count, &camera, s->lights, s->light_count, &s->options, &image,
+                              &p->stats);
+}
+
+static double decibels(const ssdgs_real *got, const ssdgs_real *want, int count) {
+    double square = 0, peak = 1e-3;
+    for (int i = 0; i < count; i++) {
+        const double d = (double)got[i] - (double)want[i];
+        square += d * d / count;
+        peak = fmax(peak, fabs((double)want[i]));
+    }
+    return test_finite(square) ? 10 * log10(peak * peak / (square + 1e-20)) : -1;
+}
+
+/* Forgets all that a device keeps. */
+static void forget(gpu *g) {
+    g->owner = NULL;
+    g->outside = g->transported = 0;
+    g->frame.models.count = g->frame.maps.count = 0;
+    for (int i = 0; i < GPU_LAMPS; i++) g->frame.light[i].ready = 0;
+}
+
+/* Scenes that change step by step: what a device keeps from frame to frame has the bits of one that keeps
+   nothing, and is close to the CPU's. */
+static void changes(int steps) {
+    static stage_set s;
+    static picture got[3];
+    static ssdgs_real median[3][PIXELS];
+    ssdgs_context *const own = context, *contexts[3];
+    ssdgs_scene *scenes[3];
+    gpu *devices[3] = {NULL, device, NULL};
+    char message[256] = "";
+    double least = 200, least_part = 200;
+    int cached = 0, on_device = 0, worst_step = -1;
+    memset(&s, 0, sizeof s);
+    devices[2] = gpu_create(NULL, message, sizeof message);
+    if (!CHECK(devices[2] != NULL)) return;
+    for (int i = 0; i < 3; i++) {
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        const ssdgs_gpu_hook hook = gpu_hook(devices[i ? i : 1]);
+        desc.gpu = i ? &hook : NULL;
+        if (!CHECK(!ssdgs_context_create(&desc, contexts + i) &&
+                   !ssdgs_scene_create(contexts[i], scenes + i)))
+            exit(1);
+        context = contexts[i];
+        for (int m = 0; m < MODELS; m++) s.models[i][m] = model_of(m);
+    }
+    s.count = 3, s.light_count = 2;
+    for (int i = 0; i < 400; i++) s.mask[i] = (unsigned char)(i * 37);
+    for (int i = 0; i < PLACES; i++) {
+        s.model[i] = i;
+        s.objects[i] = placed(NULL, 0, 1, 0, 0, 0, 0);
+        change_place(&s, i);
+    }
+    for (int i = 0; i < MOST_LIGHTS; i++) change_light(&s, i);
+    change_options(&s);
+    change_map(&s);
+    s.eye[0] = s.eye[1] = 2.2, s.eye[2] = 1;
+    for (int step = 0; step < steps; step++) {
+        if (step % 25 == 24) change_model(&s, contexts);
+        for (int i = 0; i < 3; i++) {
+            if (i == 2) forget(devices[2]);
+            memset(&got[i], 0, sizeof got[i]);
+            context = contexts[i];
+            if (!CHECK(!draw_set(&s, i, scenes[i], got + i, median[i])))
+                printf("    step %d: %s\n", step, ssdgs_error_message(context));
+        }
+        on_device += device->picture.buffer != 0;
+        cached += got[1].stats.lights_cached;
+        if (!CHECK(!memcmp(got[1].value, got[2].value, sizeof got[1].value) &&
+                   !memcmp(median[1], median[2], sizeof median[1])))
+            printf("    step %d: not as anew\n", step);
+        const double color = fmin(decibels(got[1].value, got[0].value, 3 * PIXELS),
+                                  decibels(got[1].value + 15 * PIXELS, got[0].value + 15 * PIXELS, PIXELS));
+        if (!CHECK(color > 60)) printf("    step %d: %.1f dB\n", step, color);
+        if (color < least) worst_step = step;
+        least = fmin(least, color);
+        for (int plane = 3; plane < PLANES && s.parts; plane += plane < 15 ? 3 : 1) {
+            const int size = (plane < 15 ? 3 : 1) * PIXELS;
+            const double part = decibels(got[1].value + plane * PIXELS, got[0].value + plane * PIXELS, size);
+            if (!CHECK(part > 50)) printf("    step %d, plane %d: %.1f dB\n", step, plane, part);
+            least_part = fmin(least_part, part);
+        }
+        int far_off = 0;
+        for (int i = 0; i < PIXELS; i++) far_off += fabs((double)(median[1][i] - median[0][i])) > 1e-3;
+        if (!CHECK(far_off <= PIXELS / 100)) printf("    step %d: %d median depths differ\n", step, far_off);
+        change(&s);
+    }
+    printf(
+        "%d changes: %.1f dB at least from the CPU's (step %d), parts %.1f; %d on the device, %d maps kept\n",
+        steps, least, worst_step, least_part, on_device, cached);
+    CHECK(on_device > steps / 2 && cached > steps / 2);
+    for (int i = 0; i < 3; i++) {
+        for (int m = 0; m < MODELS; m++) ssdgs_model_destroy(s.models[i][m]);
+        ssdgs_scene_destroy(scenes[i]);
+        ssdgs_context_destroy(contexts[i]);
+    }
+    gpu_destroy(devices[2]);
+    context = own;
 }
 
 /* With another transport_detail, from where other Gaussians are seen, what is kept of transport is to the bit
@@ -1145,7 +1528,7 @@ static void kept_transport(void) {
         ssdgs_context_desc desc;
         ssdgs_image image;
         char message[256] = "";
-        gpu *const g = gpu_create(message, sizeof message);
+        gpu *const g = gpu_create(NULL, message, sizeof message);
         if (!CHECK(g != NULL)) return;
         const ssdgs_gpu_hook hook = gpu_hook(g);
         memset(&desc, 0, sizeof desc);
@@ -1178,7 +1561,7 @@ static void failures(void) {
     ssdgs_context *const own = context;
     for (int way = 0; way < 2; way++) {
         char message[256] = "";
-        gpu *const g = gpu_create(message, sizeof message);
+        gpu *const g = gpu_create(NULL, message, sizeof message);
         if (!CHECK(g != NULL)) return;
         const ssdgs_gpu_hook hook = gpu_hook(g);
         const ssdgs_settings settings = small_settings();
@@ -1223,7 +1606,7 @@ static void without_drivers(void) {
     if (!child) {
         char message[256] = "";
         setenv("__EGL_VENDOR_LIBRARY_FILENAMES", "/nonexistent.json", 1);
-        const gpu *g = gpu_create(message, sizeof message);
+        const gpu *g = gpu_create(NULL, message, sizeof message);
         _exit(g ? !message[0] ? 0 : 1 : strstr(message, "no GPU: there is no") ? 0 : 1);
     }
     int status = 1;
@@ -1267,7 +1650,7 @@ static void one_tile(void) {
 int main(void) {
     char message[256] = "";
     without_drivers();
-    device = gpu_create(message, sizeof message);
+    device = gpu_create(NULL, message, sizeof message);
     if (!CHECK(device != NULL)) printf("%s\n", message);
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     if (device) {
@@ -1278,7 +1661,10 @@ int main(void) {
         sort_nothing();
         one_tile();
         left_to_the_cpu();
+        asked_maps();
+        dispatches();
         kept();
+        changes(400);
         kept_transport();
         failures();
         for (int which = 0; which < 3; which++) {
@@ -1287,7 +1673,6 @@ int main(void) {
             bin(which, which ? 500 : 3000);
             walk_camera(which, which ? 500 : 3000);
             walk_light(which, which ? 500 : 3000);
-            blend(which, which ? 500 : 3000);
             frame(which, which ? 500 : 2000, 1, 1e-4);
             frame(which, which ? 500 : 2000, 0, 3e-3);
         }

@@ -1,14 +1,15 @@
-/* Shared by bin_count.comp and bin_emit.comp: which tiles may have a splat, and which micro-tiles of one
-   it touches. As in the CPU's kernel: over the rectangle of a micro-tile's pixel centres u^2 + w^2 is
-   least on a side that faces the splat's centre. */
+/* BIN lists the instances of one Gaussian after the other, in depth order, the views' one after the
+   other, and sorts them by tiles. So a tile's list stays in depth order. Here: which tiles may have a
+   splat, and which micro-tiles of one it touches. As in the CPU's kernel: over the rectangle of a micro-
+   tile's pixel centres u^2 + w^2 is least on a side that faces the splat's centre. */
 
-layout(std430, binding = 1) readonly buffer records { splat record[]; };
-layout(std430, binding = 2) readonly buffer orders { uint order[]; };
-layout(std430, binding = 3) buffer of_gaussians { pair of_gaussian[]; };
-layout(std430, binding = 4) buffer groups { uint before[]; };
+layout(std430, binding = 3) readonly buffer records { splat record[]; };
+layout(std430, binding = 4) readonly buffer orders { uint order[]; };
+layout(std430, binding = 5) buffer of_gaussians { pair of_gaussian[]; };
+layout(std430, binding = 6) buffer groups_ { uint before[]; }; /* of each 256 ranks of a view */
 
-uvec4 box(splat s) {
-    vec2 last = vec2(16u * tiles_x - 1u, 16u * tiles_y - 1u);
+uvec4 box(splat s, ivec4 size) {
+    vec2 last = vec2(16 * size.z - 1, 16 * (size.w / size.z) - 1);
     precise vec2 low = vec2(s.x - s.extent_x, s.y - s.extent_y) - 1,
                  high = vec2(s.x + s.extent_x, s.y + s.extent_y) + 1;
     return uvec4(clamp(low, vec2(0), last), clamp(high, vec2(0), last)) / 16u;

@@ -1,6 +1,6 @@
 /* What every program begins with. A group has 256 threads, for as many items or for the pixels of a 16x16
-   tile. Groups may lie in two dimensions, as one holds only 65535; group() counts through both. No loop in
-   these files returns: NVIDIA's driver 580 would still take the loop's step. */
+   tile. Groups may lie in two dimensions, as one holds only 65535; group() counts through both. No loop
+   in these files returns: NVIDIA's driver 580 would still take the loop's step. */
 
 layout(local_size_x = 256) in;
 uint lane() { return gl_LocalInvocationIndex; }

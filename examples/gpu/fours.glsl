@@ -1,5 +1,5 @@
-/* Takes a micro-tile's entries by four, so that no weight waits for another. The program says what becomes
-   of one: meet(). */
+/* Takes a micro-tile's entries by four, so that no weight waits for another. The program says what
+   becomes of one: meet(). */
 
 /* What a program does with an entry of the window, or with `none`, whose weight is 0. */
 void meet(float weight, uint i);

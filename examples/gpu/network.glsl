@@ -1,12 +1,12 @@
-/* A network, for `inputs.z` columns at once. Reads weights: of each layer (inputs, neurons), then biases,
+/* A network, for so many columns at once. Reads weights: of each layer (inputs, neurons), then biases,
    with neurons padded to 4. Reads and writes `row`: inputs, then what each layer makes of them, in place.
    A thread sums 4 neurons of 4 columns. Its columns lie apart, so that neighbouring threads read
    neighbouring values. A hidden value that is NaN becomes 0, as on the CPU. */
 
-layout(std430, binding = 0) readonly buffer weight_block { vec4 weight[]; };
+layout(std430, binding = 4) readonly buffer weight_block { vec4 weight[]; }; /* the models' */
+int columns;
 shared float row[4096];
 void run_network(ivec4 net, int at) {
-    int columns = inputs.z;
     int apart = columns / 4;
     int column = int(lane()) % apart;
     int first = int(lane()) / apart * 4;
@@ -58,10 +58,10 @@ void run_network(ivec4 net, int at) {
     barrier();
 }
 int put(int at, float x) {
-    row[at * inputs.z + int(lane())] = x;
+    row[at * columns + int(lane())] = x;
     return at + 1;
 }
-float answer_of(int at) { return row[at * inputs.z + int(lane())]; }
+float answer_of(int at) { return row[at * columns + int(lane())]; }
 /* pi / 2 in three parts, good to 1e5 */
 void sine_cosine(float x, out float s, out float c) {
     float n = round(x * 0.636619772);

@@ -1,6 +1,10 @@
-/* Shared by seen_list.comp and seen_copy.comp: what gather_camera.comp leaves, and the list made of it. */
+/* Shared by the programs of what is seen: what gather_camera.comp leaves, and the list made of it. Each
+   object's part of the list begins at a multiple of 64; what fills it up is `none`. */
 
-layout(std140, binding = 0) uniform parameters { uint count; uint layer_count; };
-layout(std430, binding = 0) buffer seen_block { uint seen[]; };
-layout(std430, binding = 1) buffer tally_block { uvec2 tally[]; }; /* seen; the first skipped */
-layout(std430, binding = 2) buffer shaded_block { uint shaded_count; uint shaded[]; };
+layout(std430, binding = 3) buffer seens { uint seen[]; };
+layout(std430, binding = 4) buffer tallies { uvec2 tally[]; }; /* of 64: seen; the first skipped */
+/* How many are listed; the first skipped, where that is the only one. */
+layout(std430, binding = 5) buffer of_objects { uvec2 of_object[]; };
+layout(std430, binding = 6) buffer shadeds { uint shaded_count; uint shaded[]; }; /* with what fills up */
+layout(std430, binding = 7) buffer neighbour_block { uint neighbours[]; };
+layout(std430, binding = 9) buffer aheads { uint ahead_of[]; }; /* of 64: the object's listed before them */

@@ -2,14 +2,12 @@
    Gaussian gets its neighbour's. */
 #version 430
 #include "common.glsl"
+#include "frame.glsl"
 #include "seen.glsl"
 
-layout(std430, binding = 3) readonly buffer neighbour_block { uint neighbours[]; };
-layout(std430, binding = 4) buffer color_block { vec4 colors[]; };
-layout(std430, binding = 5) buffer layer_block { vec4 layers[]; };
+layout(std430, binding = 8) buffer layer_block { vec4 layer[]; };
 void main() {
     if (item() >= count || neighbours[item()] == none) return;
     uint from = shaded[neighbours[item()]];
-    colors[item()] = colors[from];
-    for (uint i = 0u; i < layer_count; i++) layers[i * count + item()] = layers[i * count + from];
+    for (uint i = 0u; i <= layers; i++) layer[i * count + item()] = layer[i * count + from];
 }

@@ -1,29 +1,32 @@
-/* SHADE begins. Reads which Gaussians are seen and which are skipped, and the tally of each 256. Writes
-   the list of those to be shaded, ascending. Writes for each skipped one its neighbour, a place in that
-   list. If all are skipped some colour is needed: the first one is shaded. */
+/* SHADE lists, a thread a Gaussian. Reads which are seen, which are skipped, and what seen_objects.comp
+   has counted. Writes the list of those to be shaded, ascending. Writes for each skipped one its
+   neighbour, a place in that list. */
 #version 430
 #include "common.glsl"
+#include "frame.glsl"
 #include "scan.glsl"
 #include "seen.glsl"
 
-layout(std430, binding = 3) writeonly buffer neighbour_block { uint neighbours[]; };
-shared uint first;
+uint listed_of(uint o) { return (of_object[o].x + 63u) & ~63u; }
 void main() {
-    bool within = item() < count;
-    uint is = within ? seen[item()] : 0u, before = 0u, all = 0u, own;
-    if (lane() == 0u) first = none;
+    uint g = min(item(), count - 1u), o = object_at(g), o_first = object_at(min(256u * group(), count - 1u));
+    uint mine = 0u, before, all;
+    if (256u * group() >= count) return;
+    for (uint p = lane(); p < o_first; p += 256u) mine += listed_of(p);
+    scan(mine, before); /* the total alone */
+    for (uint p = o_first; p < o; p++) before += listed_of(p);
+    bool within = item() < count && g - uint(objects[o].place.x) < uint(objects[o].place.y);
+    uint is = within ? seen[g] : 0u;
+    if (within && g == of_object[o].y) seen[g] = is = is_seen;
+    uint rank = scan(uint(is == is_seen), all), ahead = lane() & ~63u;
     barrier();
-    for (uint at = lane(); 256u * at < count; at += 256u) {
-        all += tally[at].x;
-        if (at < group()) before += tally[at].x;
-        if (tally[at].y != none) atomicMin(first, tally[at].y);
-    }
-    scan(before, before); /* of each the total alone */
-    scan(all, all);
-    if (all == 0u && item() == first) seen[item()] = is = is_seen;
-    uint place = before + scan(uint(is == is_seen), own);
-    if (item() == 0u) shaded_count = all == 0u && first != none ? 1u : all;
-    if (!within) return;
-    if (is == is_seen) shaded[place] = item();
-    neighbours[item()] = is == is_skipped ? max(place, 1u) - 1u : none;
+    scanned[lane()] = rank; /* less that of the first of the 64 */
+    barrier();
+    uint place = before + (of_object[o].y == none ? ahead_of[g >> 6u] : 0u) + rank - scanned[ahead];
+    if (is == is_seen) shaded[place] = g;
+    if (item() < count) neighbours[g] = is == is_skipped ? max(place, before + 1u) - 1u : none;
+    uint last = uint(objects[o].place.x) + uint(objects[o].place.y) - 1u, used = of_object[o].x;
+    if (item() >> 6u == last >> 6u && (used & 63u) != 0u && (item() & 63u) >= (used & 63u))
+        shaded[before + (used & ~63u) + (item() & 63u)] = none; /* the object's last 64 fill its part up */
+    if (item() == count - 1u) shaded_count = before + listed_of(o);
 }

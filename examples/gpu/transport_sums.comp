@@ -1,21 +1,23 @@
-/* True dipole transport of a light. Reads places, flux, nodes, and which Gaussians are seen. Writes for
-   each Gaussian and each length l the sum of flux exp(-r / l) / r, r = sqrt(distance^2 + soft^2). Writes
-   which revision of the flux these are of. A group does 64 neighbours, with four threads for each. A node
-   that is far from all 64 is a point; others are opened. If one of the 64 is seen all get their sums, so
-   that what is kept does not depend on what was seen before. */
+/* True dipole transport. Reads places, flux, nodes, and which Gaussians are seen. Writes for each
+   Gaussian and each length l the sum of flux exp(-r / l) / r, r = sqrt(distance^2 + soft^2). Writes which
+   revision of the flux these are of. A group does 64 neighbours, with four threads for each. A node that
+   is far from all 64 is a point; others are opened. If one of the 64 is seen all get their sums, so that
+   what is kept does not depend on what was seen before. */
 #version 430
 #include "common.glsl"
+#include "frame.glsl"
+#include "model.glsl"
 #include "transport.glsl"
 
 const uint lengths = 5u;
-layout(std430, binding = 2) readonly buffer node_block { node node_of[]; };
-layout(std430, binding = 3) readonly buffer seen_block { uint seen[]; };
-layout(std430, binding = 4) writeonly buffer transport_block { float transported[]; };
-layout(std430, binding = 5) buffer arrived_block { uint arrived[]; }; /* the revision of each 64 */
+layout(std430, binding = 5) readonly buffer node_block { node node_of[]; };
+layout(std430, binding = 6) readonly buffer seen_block { uint seen[]; };
+layout(std430, binding = 7) writeonly buffer transport_block { float transported[]; };
+layout(std430, binding = 8) buffer arrived_block { uint arrived[]; }; /* the revision of each 64 */
 shared vec4 points[256];
 shared uint opened[512]; /* nodes of nodes; nodes */
 shared uint bits[16]; /* of 256 nodes: those far away; those to be opened */
-shared float parts[256 * 5];
+shared float shares[256 * 5];
 shared uint wanted;
 vec3 place;
 vec4 middle; /* of the 64; how far they are from it */
@@ -26,7 +28,8 @@ void add_points(uint many) {
         vec4 from = points[i];
         if (from.w == 0.0) continue;
         vec3 way = place - from.xyz;
-        float r2 = dot(way, way) + soft2, inverse = inversesqrt(r2), e = exp2(r2 * inverse * longest);
+        float r2 = dot(way, way) + objects[o].travel.x, inverse = inversesqrt(r2);
+        float e = exp2(r2 * inverse * objects[o].travel.y);
         for (uint k = lengths; k > 0u; k--) {
             sum[k - 1u] += from.w * inverse * e;
             e *= e;
@@ -68,35 +71,40 @@ uint open(uint at, bool there, uint list) {
     return counts[1];
 }
 void main() {
-    uint first = 64u * group();
-    if (first >= count) return;
-    uint me = min(first + (lane() & 63u), count - 1u);
+    uint block = group() % blocks, first = 64u * block;
+    light = group() / blocks;
+    o = object_at(first);
+    if (light >= lights || !is_asked()) return;
+    uint me = min(first + (lane() & 63u), end_of() - 1u);
+    uint low = first_of() / 64u, nodes = (end_of() + 63u) / 64u;
     if (lane() == 0u) wanted = 0u;
     barrier();
     if (seen[me] == is_seen) wanted = 1u;
     barrier();
-    if (wanted == 0u || arrived[light * nodes + group()] == revision) return;
+    if (wanted == 0u || arrived[light * blocks + block] == uint(lamps[light].of.z)) return;
     place = source(me).xyz;
+    if (!is_finite(place)) place = vec3(0); /* it is not drawn; its neighbours are */
     for (uint k = 0u; k < lengths; k++) sum[k] = 0.0;
     find_middle();
-    for (uint base = 0u; base < above(); base += 256u) {
-        uint tops = open(nodes + base + lane(), base + lane() < above(), 0u);
+    uint top_first = blocks + uint(objects[o].of.z), all_tops = uint(objects[o].of.w);
+    for (uint base = 0u; base < all_tops; base += 256u) {
+        uint tops = open(top_first + base + lane(), base + lane() < all_tops, 0u);
         for (uint top = 0u; top < tops; top += 4u) {
             uint own = top + lane() / 64u,
-                at = own < tops ? 64u * (opened[own] - nodes) + lane() % 64u : nodes;
+                at = own < tops ? low + 64u * (opened[own] - top_first) + lane() % 64u : nodes;
             uint near = open(at, at < nodes, 256u);
             for (uint i = 0u; i < near; i += 4u) {
                 uint which = i + lane() / 64u,
-                    g = which < near ? 64u * opened[256u + which] + lane() % 64u : count;
-                points[lane()] = g < count ? source(g) : vec4(0);
+                    g = which < near ? 64u * opened[256u + which] + lane() % 64u : end_of();
+                points[lane()] = g < end_of() ? source(g) : vec4(0);
                 add_points(256u);
             }
         }
     }
-    for (uint k = 0u; k < lengths; k++) parts[256u * k + lane()] = sum[k];
+    for (uint k = 0u; k < lengths; k++) shares[256u * k + lane()] = sum[k];
     barrier();
-    for (uint k = 0u, at = lane(); k < lengths && lane() < 64u && first + lane() < count; k++, at += 256u)
-        transported[(light * lengths + k) * count + me] =
-            scale / float(1u << k) * (parts[at] + parts[at + 64u] + parts[at + 128u] + parts[at + 192u]);
-    if (lane() == 0u) arrived[light * nodes + group()] = revision;
+    for (uint k = 0u, at = lane(); k < lengths && lane() < 64u && first + lane() < end_of(); k++, at += 256u)
+        transported[(light * lengths + k) * count + me] = objects[o].travel.z / float(1u << k) *
+            (shares[at] + shares[at + 64u] + shares[at + 128u] + shares[at + 192u]);
+    if (lane() == 0u) arrived[light * blocks + block] = uint(lamps[light].of.z);
 }

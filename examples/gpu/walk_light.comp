@@ -1,19 +1,18 @@
-/* WALK of a light: eqs. 6, 7 and the depth cue. Reads the tiles' lists of one of its views. Writes of each
-   entry the sums of rho v, rho and rho x cue. An entry is sampled once all that is nearer than its
-   distance - bias is in the transmittance. So two windows run along the list: what is sampled, and what is
-   applied to the transmittance. A thread takes of both what its micro-tile has. In the dark nothing is
+/* WALK of a light: eqs. 6, 7 and the depth cue. Reads the tiles' lists of one of its views. Writes of
+   each entry the sums of rho v, rho and rho x cue. An entry is sampled once all that is nearer than its
+   distance - bias is in the transmittance. So two windows run along the list: what is sampled, and what
+   is applied to the transmittance. A thread takes of both what its micro-tile has. In the dark nothing is
    applied any more. What is in no other tile is not sampled there, unless for its cue: v = 0 / 1. */
 #version 430
 #include "common.glsl"
+#include "frame.glsl"
 #include "walk.glsl"
 const uint window = 64u, windows = 2u;
 #include "window.glsl"
 #include "sums.glsl"
 
-layout(std430, binding = 3) readonly buffer depths { float depth[]; };
-layout(std430, binding = 4) readonly buffer of_gaussians { pair of_gaussian[]; };
-layout(std430, binding = 5) writeonly buffer sums { vec4 tile_sums[]; };
-layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
+layout(std430, binding = 7) readonly buffer of_gaussians { pair of_gaussian[]; };
+layout(std430, binding = 8) writeonly buffer sums { vec4 tile_sums[]; };
 shared float depths_of[windows * window];
 shared uint alone[window];
 float t, met; /* transmittance; sum of blend weight x distance */
@@ -26,7 +25,7 @@ void load_near(uint from, uint end) {
         bool there = from + lane() < end;
         pair entry = tile_list[min(from + lane(), end - 1u)];
         load(window + lane(), entry.first, there ? entry.second : 0u);
-        depths_of[window + lane()] = there ? depth[entry.first] : 1e30;
+        depths_of[window + lane()] = there ? depth[base + entry.first] : 1e30;
     }
     find_covered(1u);
     near_word = 0u;
@@ -49,8 +48,8 @@ void apply(float reach, float nearest, vec2 at) {
 }
 
 void main() {
-    if (group() >= tiles) return;
-    uint begin = tile_start[group()], end = tile_start[group() + 1u], next = begin + window; /* near window */
+    if (!find_tile(camera_tiles + group(), tiles)) return;
+    uint begin = tile_start[tile], end = tile_start[tile + 1u], next = begin + window; /* near window */
     float nearest = facts[view].nearest;
     bool dark = false;
     vec2 at = centre();
@@ -67,9 +66,9 @@ void main() {
                 if (from + lane() < end) {
                     pair entry = tile_list[from + lane()];
                     load(lane(), entry.first, entry.second);
-                    depths_of[lane()] = depth[entry.first];
-                    alone[lane()] =
-                        shared_views + cue == 0u && of_gaussian[entry.first].second == 1u ? 1u : 0u;
+                    depths_of[lane()] = depth[base + entry.first];
+                    bool once = of_gaussian[base + entry.first].second == 1u;
+                    alone[lane()] = views[view].of.w == 0 && cue == 0u && once ? 1u : 0u;
                 }
             }
             find_covered(0u);

@@ -1,19 +1,17 @@
 /* WALK of a light whose map or flux is asked for. Reads the tiles' lists of one of its views. Writes the
-   map: of each pixel where transmittance falls below 0.98, 0.5 and 0.1. With flux it writes of each entry
-   the sum of solid angle x blend weight. */
+   map: of each pixel where transmittance falls below 0.98, 0.5 and 0.1. A tile where nothing is has -1
+   first. With flux it writes of each entry the sum of solid angle x blend weight. */
 #version 430
 #include "common.glsl"
+#include "frame.glsl"
 #include "walk.glsl"
 const uint window = 64u, windows = 1u;
 #include "window.glsl"
 #include "fours.glsl"
 #include "sums.glsl"
 
-layout(std430, binding = 3) readonly buffer depths { float depth[]; };
-layout(std430, binding = 7) writeonly buffer maps { vec4 light_map[]; };
-layout(std430, binding = 5) buffer sums { vec4 tile_sums[]; };
-layout(std430, binding = 6) readonly buffer facts_ { fact facts[]; };
-layout(std430, binding = 8) writeonly buffer map_tiles { uint map_tile[]; };
+layout(std430, binding = 8) buffer sums { vec4 tile_sums[]; };
+layout(std430, binding = 9) writeonly buffer maps_ { vec4 light_map[]; };
 shared float distances[window];
 float t, omega; /* transmittance; solid angle */
 const float levels[4] = float[4](0.98, 0.5, 0.1, -1);
@@ -31,8 +29,9 @@ void note(float from, float to, float distance) {
     }
 }
 float solid_angle() {
-    vec2 slope = (centre() - vec2(cx, cy)) * inverse_focal;
-    float cosine2 = orthographic != 0u ? 1 : 1 / (1 + dot(slope, slope));
+    float inverse_focal = views[view].kind.w;
+    vec2 slope = (centre() - views[view].lens.zw) * inverse_focal;
+    float cosine2 = views[view].kind.y > 0 ? 1 : 1 / (1 + dot(slope, slope));
     return cosine2 * sqrt(cosine2) * inverse_focal * inverse_focal;
 }
 
@@ -44,9 +43,9 @@ void meet(float weight, uint i) {
     if (flux != 0u) part[0][i % at_once][lane()] = omega * alpha * past;
 }
 void main() {
-    if (group() >= tiles) return;
-    uint begin = tile_start[group()], end = tile_start[group() + 1u], number = first_tile + group();
-    if (map != 0u && lane() == 0u) map_tile[number] = begin < end ? number : none;
+    if (!find_tile(camera_tiles + group(), tiles)) return;
+    uint begin = tile_start[tile], end = tile_start[tile + 1u], number = uint(views[view].of.y) + own_tile;
+    if (maps != 0u && begin == end && lane() == 0u) light_map[number * 512u].x = -1; /* nothing is there */
     float nearest = facts[view].nearest;
     bool dark = false;
     vec2 at = centre();
@@ -63,7 +62,7 @@ void main() {
         if (lane() < entries) {
             pair entry = tile_list[from + lane()];
             load(lane(), entry.first, entry.second);
-            distances[lane()] = depth[entry.first] - nearest;
+            distances[lane()] = depth[base + entry.first] - nearest;
         }
         find_covered(0u);
         for (uint first = 0u; first < entries; first += at_once) {
@@ -77,7 +76,7 @@ void main() {
         }
         dark = is_dark(t, step);
     }
-    if (map == 0u || begin == end) return;
+    if (maps == 0u || begin == end) return;
     light_map[(number * 256u + lane()) * 2u] = vec4(falls, left.x);
     light_map[(number * 256u + lane()) * 2u + 1u] = vec4(left.y, before, t);
 }

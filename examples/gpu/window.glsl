@@ -14,8 +14,8 @@ shared vec2 spreads[windows * window];
 shared uint masks[windows * window]; /* 0 where there is no entry */
 shared uint covered[windows * 16u * words]; /* a bit an entry, of each micro-tile */
 void load(uint place, uint gaussian, uint mask) {
-    splats[place] = record[2u * gaussian];
-    spreads[place] = record[2u * gaussian + 1u].xy;
+    splats[place] = record[2u * (base + gaussian)];
+    spreads[place] = record[2u * (base + gaussian) + 1u].xy;
     masks[place] = mask;
 }
 void find_covered(uint which) {
