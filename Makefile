@@ -111,6 +111,9 @@ test-images: $(BUILD)/pixels ## images that other programs wrote, beside what th
 test-gpu: $(BUILD)/t_gpu ## examples/gpu on a GPU or in Mesa's software; needs EGL with OpenGL 4.3
 	$(BUILD)/t_gpu
 
+test-engine: $(BUILD)/engine_gl ## splats among meshes in an engine's window and OpenGL context; needs SDL2, OpenGL 4.3 and a display, or xvfb-run
+	$(if $(DISPLAY),,xvfb-run -a) $(BUILD)/engine_gl $(BUILD)/engine_gl.png
+
 test-mpi: $(BUILD)/train_mpi ## training on several processes; needs mpicc
 	sh tests/mpi.sh $(BUILD)
 test-asan: ## tests under the address sanitizer
@@ -177,9 +180,12 @@ $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 $(BUILD)/t_ball: examples/ball.c
 $(BUILD)/train $(BUILD)/view: LDLIBS += $(if $(WINDOWS),-lws2_32)
 # What has the GPU's stages
-$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: examples/gpu/gpu_gl.c $(BUILD)/gpu_shaders.h
-$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: PROGRAM += -I$(BUILD)
-$(BUILD)/view $(BUILD)/bench $(BUILD)/t_gpu: LDLIBS += $(if $(WINDOWS),,-ldl)
+ON_GPU = $(addprefix $(BUILD)/,view engine bench t_gpu engine_gl)
+$(ON_GPU): examples/gpu/gpu_gl.c $(BUILD)/gpu_shaders.h
+$(ON_GPU): PROGRAM += -I$(BUILD)
+$(ON_GPU): LDLIBS += $(if $(WINDOWS),,-ldl)
+$(BUILD)/engine_gl: PROGRAM += $(patsubst -I%,-isystem %,$(shell sdl2-config --cflags))
+$(BUILD)/engine_gl: LDLIBS += $(shell sdl2-config --libs) -lGL
 $(BUILD)/gpu_shaders.h: examples/gpu/shaders.awk $(wildcard examples/gpu/*.comp examples/gpu/*.glsl) | $(BUILD)
 	awk -f $(filter-out %.glsl,$^) >$@ || { rm -f $@; exit 1; }
 $(BUILD)/t_check: examples/check.c
@@ -212,5 +218,5 @@ $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo view web test-browser test-gltf test-editors test-plain test-images test-gpu test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo view web test-browser test-gltf test-editors test-plain test-images test-gpu test-engine test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

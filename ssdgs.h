@@ -655,13 +655,14 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
 /* A shadow map of an engine's meshes: depths seen from a light. Cascades and a cube's faces are several maps
    of one light: a place is looked up, between four pixels, in the first that has it. */
 typedef struct ssdgs_shadow_map {
-    int light;              /* its number in the frame */
-    int width, height;      /* px */
-    int flags;              /* of matrix: SSDGS_COLUMN_MAJOR, SSDGS_CLIP_Y_DOWN, SSDGS_CLIP_Z_FROM_0 */
-    const float *depth;     /* (height,width) as for ssdgs_depth_from_buffer(); may be reversed */
-    ptrdiff_t pitch;        /* as there */
-    uint64_t revision;      /* another one whenever depths differ */
-    ssdgs_real matrix[16];  /* (4,4) clip = projection x view of the light, x a place in the world */
+    int light;             /* its number in the frame */
+    int width, height;     /* px */
+    int flags;             /* of matrix: SSDGS_COLUMN_MAJOR, SSDGS_CLIP_Y_DOWN, SSDGS_CLIP_Z_FROM_0 */
+    const float *depth;    /* (height,width) as for ssdgs_depth_from_buffer(); may be reversed. NULL: desc.gpu
+                              has them, and where the CPU draws nothing is hidden */
+    ptrdiff_t pitch;       /* as there */
+    uint64_t revision;     /* another one whenever depths differ */
+    ssdgs_real matrix[16]; /* (4,4) clip = projection x view of the light, x a place in the world */
     ssdgs_real bias, range; /* world units. bias: how far behind a surface nothing is in its shadow yet.
                                range: above 0: depth has distances from the light / range instead */
 } ssdgs_shadow_map;
@@ -4148,11 +4149,9 @@ static ssdgs_result ssdgs__occluder_check(ssdgs_context *context, const ssdgs_oc
         const ssdgs_shadow_map *m = occluder->maps + i;
         SSDGS__REFUSE(m->width < 1 || m->width > 32768 || m->height < 1 || m->height > 32768,
                       "shadow map %d: %d x %d pixels, where 1 to 32768 are possible", i, m->width, m->height);
-        SSDGS__REFUSE(!m->depth || m->light < 0 || (m->flags & ~known),
-                      !m->depth      ? "shadow map %d: depth is NULL"
-                      : m->light < 0 ? "shadow map %d: light = %d"
-                                     : "shadow map %d: flags = %d",
-                      i, m->light < 0 ? m->light : m->flags);
+        SSDGS__REFUSE(!m->depth && !context->gpu.user, "shadow map %d: depth is NULL", i);
+        SSDGS__REFUSE(m->light < 0 || (m->flags & ~known), "shadow map %d: light = %d, flags = %d", i,
+                      m->light, m->flags);
         SSDGS__REFUSE(!(m->bias >= 0 && ssdgs__finite(m->bias) && m->range >= 0 && ssdgs__finite(m->range)),
                       "shadow map %d: bias = %g or range = %g is negative or not finite", i, (double)m->bias,
                       (double)m->range);
@@ -5385,9 +5384,10 @@ static ssdgs_real ssdgs__shadow_map_at(const ssdgs_shadow_map *m, const ssdgs_re
     for (int i = 0; i < 4; i++) {
         const int column = (int)x + (i & 1), row = (int)y + (i >> 1);
         const double part = (i & 1 ? x - (int)x : (int)x + 1 - x) * (i >> 1 ? y - (int)y : (int)y + 1 - y);
-        const float *from =
-            (const float *)((const char *)m->depth + m->pitch * (row < m->height ? row : m->height - 1));
-        const double there = (double)from[column < m->width ? column : m->width - 1];
+        const ptrdiff_t line = m->pitch * (row < m->height ? row : m->height - 1);
+        float value;
+        memcpy(&value, (const char *)m->depth + line + 4 * (column < m->width ? column : m->width - 1), 4);
+        const double there = (double)value;
         passed += (reversed ? there > d : there < d) ? 0 : part;
     }
     return (ssdgs_real)passed;
@@ -5419,7 +5419,8 @@ static void ssdgs__let_pass(const ssdgs_frame *frame, int light, const ssdgs_rea
         for (int c = 0; c < 3; c++) away[c] /= distance > 0 ? distance : 1;
         ssdgs_real passed = -1;
         for (int j = 0; j < o->map_count && passed < 0; j++)
-            if (o->maps[j].light == light) passed = ssdgs__shadow_map_at(o->maps + j, points, away, distance);
+            if (o->maps[j].light == light && o->maps[j].depth)
+                passed = ssdgs__shadow_map_at(o->maps + j, points, away, distance);
         if (passed >= 0) fraction[i] *= passed;
     }
 }

@@ -1186,6 +1186,86 @@ static double frame_ms(bench *b, ssdgs_model *model, int width, int height, int 
     return 1e3 * (olat_seconds() - start) / frames;
 }
 
+enum { PLACED = 20, PLACED_LIGHTS = 4 };
+
+/* Milliseconds a frame of a scene of placed objects that moves, or rests. color: NULL: the
+   picture does not come back. */
+static double level_ms(ssdgs_context *context, ssdgs_scene *scene, ssdgs_model *model, int frames, int moves,
+                       ssdgs_real *color) {
+    const ssdgs_real up[3] = {0, 0, 1}, eye[3] = {0, -7, 3}, target[3] = {0, 0, 0}, sun[3] = {0.6f, 0, -0.8f},
+                     white[3] = {9, 9, 9}, even[3] = {1, 1, 1};
+    const int w = 1280, h = 720;
+    ssdgs_image image;
+    double start = 0;
+    memset(&image, 0, sizeof image);
+    image.color = color;
+    for (int frame = -1; frame < frames; frame++) { /* the first does not count */
+        ssdgs_object objects[PLACED];
+        ssdgs_light lights[PLACED_LIGHTS];
+        const double t = moves ? 0.1 * (frame + 1) : 0;
+        for (int i = 0; i < PLACED; i++) {
+            const double turn = t + i, c = cos(turn), d = sin(turn);
+            const ssdgs_real rows[12] = {(ssdgs_real)c,
+                                         (ssdgs_real)-d,
+                                         0,
+                                         (ssdgs_real)(1.4 * (i % 5 - 2)),
+                                         (ssdgs_real)d,
+                                         (ssdgs_real)c,
+                                         0,
+                                         (ssdgs_real)(1.4 * (i / 5 - 1.5)),
+                                         0,
+                                         0,
+                                         1,
+                                         0};
+            objects[i] = ssdgs_object_default(model);
+            memcpy(objects[i].to_world, rows, sizeof rows);
+        }
+        for (int i = 0; i < PLACED_LIGHTS; i++) {
+            const ssdgs_real at[3] = {(ssdgs_real)(4 * cos(t + 2 * i)), (ssdgs_real)(4 * sin(t + 2 * i)), 4},
+                             down[3] = {-at[0], -at[1], -at[2]};
+            lights[i] = i == 3   ? ssdgs_light_directional(sun, even)
+                        : i == 2 ? ssdgs_light_spot(at, down, white, 0.3f, 0.5f)
+                                 : ssdgs_light_point(at, white);
+        }
+        const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.9f, w, h);
+        if (!frame) start = olat_seconds();
+        check(context,
+              ssdgs_scene_render(scene, objects, PLACED, &camera, lights, PLACED_LIGHTS, NULL, &image, NULL));
+    }
+    return 1e3 * (olat_seconds() - start) / frames;
+}
+
+/* An engine's level on a GPU beside the CPU's. */
+static void measure_gpu_level(bench *b, gpu *device, int gaussians, int frames) {
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    double ms[2][3];
+    for (int on = 0; on < 2; on++) {
+        ssdgs_context_desc desc;
+        ssdgs_context *context;
+        ssdgs_scene *scene;
+        ssdgs_model *loaded, *model;
+        memset(&desc, 0, sizeof desc);
+        if (on) desc.gpu = &hook;
+        check(NULL, ssdgs_context_create(&desc, &context));
+        check(context, ssdgs_scene_create(context, &scene));
+        check(context, ssdgs_model_load(context, b->model, &loaded, NULL));
+        model = crowd(context, loaded, gaussians);
+        for (int j = 0; j < 3; j++)
+            ms[on][j] = level_ms(context, scene, model, frames, j < 2, j == 1 ? b->color : NULL);
+        ssdgs_model_destroy(loaded);
+        ssdgs_model_destroy(model);
+        ssdgs_scene_destroy(scene);
+        ssdgs_context_destroy(context);
+    }
+    printf("%d objects of %d Gaussians, %d lights, 1280 x 720; milliseconds a frame\n"
+           "                         | all moves, with picture, at rest\n"
+           "  GPU                    | %8.1f %8.1f %8.1f\n"
+           "  CPU                    | %8.1f %8.1f %8.1f\n"
+           "  CPU / GPU: %.2f; GPU at rest / moving: %.2f\n",
+           PLACED, gaussians, PLACED_LIGHTS, ms[1][0], ms[1][1], ms[1][2], ms[0][0], ms[0][1], ms[0][2],
+           ms[0][0] / ms[1][0], ms[1][2] / ms[1][0]);
+}
+
 /* Frames of models of several sizes on a GPU and on the CPU, and the GPU's stages. */
 static void measure_gpu(bench *b) {
     static const int counts[3] = {30000, 300000, 1000000},
@@ -1234,6 +1314,7 @@ static void measure_gpu(bench *b) {
             ssdgs_context_destroy(contexts[on]);
         }
     }
+    measure_gpu_level(b, device, b->quick ? 500 : 15000, b->quick ? 1 : 3);
     gpu_destroy(device);
 }
 

@@ -1,10 +1,13 @@
-/* cc -O2 examples/engine.c -o engine -lm -lpthread: how a game engine draws with ssdgs.h. Meshes, a floor and
-   a box, and three objects of two models, trained ones or plain splats, stand in a level, under a spot that
-   moves, a sun and a fill light. Everything hides and shadows everything. usage: engine [--frames N] [--size
-   W H] [--out PREFIX] [MODEL.ply [MODEL.ply]]; writes PREFIX000.png and so on, and PREFIXsheet.png with nine
-   of them; PREFIX is build/engine_. */
+/* (cd examples/gpu; awk -f shaders.awk *.comp) >gpu_shaders.h
+   cc -O2 -I. examples/engine.c -o engine -lm -lpthread (before glibc 2.34: -ldl): how a game engine draws
+   with ssdgs.h. Meshes, a floor and a box, and three objects of two models, trained ones or plain splats,
+   stand in a level, under a spot that moves, a sun and a fill light. Everything hides and shadows everything.
+   usage: engine [--frames N] [--size W H] [--out PREFIX] [--gpu] [MODEL.ply [MODEL.ply]]; writes
+   PREFIX000.png and so on, and PREFIXsheet.png with nine of them; PREFIX is build/engine_. --gpu: splats are
+   drawn on the GPU, and read back: tests/engine_gl.c has an engine's own window, where nothing is. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
+#include "gpu/gpu_gl.c"
 #include "olat.h"
 #include "reduce.h"
 #include "unbake.h"
@@ -358,9 +361,10 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     fprintf(stderr, "engine: %s%s\n", code ? "" : "note: ", message);
 }
 
-static ssdgs_result open_context(int threads, ssdgs_context **out) {
+static ssdgs_result open_context(int threads, const ssdgs_gpu_hook *hook, ssdgs_context **out) {
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
+    desc.gpu = hook;
     desc.logger.write = hear;
     desc.threads = threads;
     return ssdgs_context_create(&desc, out);
@@ -390,14 +394,14 @@ static ssdgs_result read_model(const load *job, int index, ssdgs_model **out) {
    have its levels of detail in files: build/relight --reduce teaches them, too. */
 static void load_model(void *loads, int index) {
     load *job = (load *)loads + index;
-    job->result = open_context(1, &job->context);
+    job->result = open_context(1, NULL, &job->context);
     if (!job->result) job->result = read_model(job, index, &job->model);
     if (!job->result) job->result = read_model(job, index, &job->coarse);
     if (!job->result)
         job->result = reduce_model(job->context, &job->coarse, ssdgs_model_count(job->model) / 3 + 1);
 }
 
-static ssdgs_result open_level(level *l, const char *const models[2]) {
+static ssdgs_result open_level(level *l, const char *const models[2], const ssdgs_gpu_hook *hook) {
     ssdgs_occluder meshes;
     const float low[3] = {-0.1f, 0.6f, 0}, high[3] = {0.5f, 1.2f, 1.3f};
     load loads[2];
@@ -405,7 +409,7 @@ static ssdgs_result open_level(level *l, const char *const models[2]) {
     memcpy(l->box_high, high, sizeof high);
     memset(loads, 0, sizeof loads);
     for (int i = 0; i < 2; i++) loads[i].path = models[i];
-    ssdgs_result result = open_context(0, &l->context);
+    ssdgs_result result = open_context(0, hook, &l->context);
     if (!result)
         result = ssdgs_context_run(l->context, 2, load_model, loads); /* or threads of the engine's */
     for (int i = 0; i < 2; i++) {
@@ -447,13 +451,14 @@ static int number(const char *text) {
 
 int main(int argc, char **argv) {
     const char *out = "build/engine_", *models[2] = {NULL, NULL};
-    int frames = 120, given = 0, failed = 0;
+    int frames = 120, given = 0, failed = 0, wants_gpu = 0;
     level l;
     memset(&l, 0, sizeof l);
     l.width = 480, l.height = 270;
     for (int i = 1; i < argc && !failed; i++) {
         if (!strcmp(argv[i], "--frames") && i + 1 < argc) frames = number(argv[++i]);
         else if (!strcmp(argv[i], "--out") && i + 1 < argc) out = argv[++i];
+        else if (!strcmp(argv[i], "--gpu")) wants_gpu = 1;
         else if (!strcmp(argv[i], "--size") && i + 2 < argc)
             l.width = number(argv[++i]), l.height = number(argv[++i]);
         else if (argv[i][0] != '-' && given < 2) models[given++] = argv[i];
@@ -462,8 +467,8 @@ int main(int argc, char **argv) {
     if (failed || frames < 1 || frames > 999 || l.width < 16 || l.height < 16 || l.width > 4096 ||
         l.height > 4096) {
         fprintf(stderr,
-                "usage: engine [--frames N, 1 .. 999] [--size W H, 16 .. 4096] [--out PREFIX] [MODEL.ply "
-                "[MODEL.ply]]\n");
+                "usage: engine [--frames N, 1 .. 999] [--size W H, 16 .. 4096] [--out PREFIX] [--gpu] "
+                "[MODEL.ply [MODEL.ply]]\n");
         return 2;
     }
     const size_t pixels = (size_t)l.width * (size_t)l.height;
@@ -481,7 +486,12 @@ int main(int argc, char **argv) {
     }
     failed = !planes || !sheet || !l.pixels;
     if (failed) fprintf(stderr, "out of memory\n");
-    ssdgs_result result = failed ? SSDGS_OK : open_level(&l, models);
+    char message[256] = "";
+    gpu *const device = wants_gpu ? gpu_create(NULL, message, sizeof message) : NULL;
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    if (device) printf("on %s\n", gpu_name(device));
+    else if (wants_gpu) fprintf(stderr, "engine: %s: the CPU renders\n", message);
+    ssdgs_result result = failed ? SSDGS_OK : open_level(&l, models, device ? &hook : NULL);
     for (int frame = 0; frame < frames && !result && !failed; frame++) {
         char name[32];
         result = draw_frame(&l, (float)frame / (float)frames);
@@ -507,6 +517,7 @@ int main(int argc, char **argv) {
     ssdgs_scene_destroy(l.scene);
     for (int i = 0; i < 2; i++) ssdgs_model_destroy(l.models[i]), ssdgs_model_destroy(l.coarse[i]);
     ssdgs_context_destroy(l.context);
+    gpu_destroy(device);
     free(planes), free(sheet), free(l.pixels);
     return result || failed;
 }

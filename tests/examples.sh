@@ -239,6 +239,7 @@ check "its Gaussians are floats" grep -aq "property float x" "$out/moved.ply"
 engine() { "$build/engine" --frames 2 --size 96 54 --out "$out/level_" "$@"; }
 check "engine" "$build/engine" --frames 2 --size 96 54 --out "$out/made_"
 check "engine with a model" "$build/engine" --frames 1 --size 96 54 --out "$out/given_" "$model"
+check "engine on a GPU, where there is one" "$build/engine" --frames 1 --size 96 54 --out "$out/gpu_" --gpu "$model"
 check "its pictures" test -s "$out/made_001.png" -a -s "$out/made_sheet.png" -a ! -e "$out/made_002.png"
 check "they differ" differs "$out/made_000.png" "$out/made_001.png"
 check "models too" differs "$out/made_000.png" "$out/given_000.png"

@@ -232,7 +232,7 @@ static void seen_list(void) {
         device->tables->objects[o].place[1] = counts[o];
         for (uint32_t i = 0; i < (uint32_t)counts[o]; i++) {
             const uint32_t any = i < 10 ? i & 2 : (uint32_t)(3 * draw(first + i));
-            seen[first + i] = o == 3 ? SSDGS_SKIPPED : o == 5 ? 0 : any;
+            seen[first + i] = o == 3 ? 2 : o == 5 ? 0 : any;
             of[(first + i) / 64] = (uint32_t)o;
         }
         p->count = first + (uint32_t)counts[o];

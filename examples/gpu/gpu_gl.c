@@ -43,7 +43,14 @@ void gpu_destroy(gpu *g);
    GLX context. A frame in which the device fails ends with its message; those after it are the CPU's. */
 ssdgs_gpu_hook gpu_hook(gpu *g);
 
-/* ---- for engines whose OpenGL context it is in ---- */
+/* ---- for engines whose OpenGL context it is in ----
+
+   A frame, as tests/engine_gl.c has it:
+       shadow maps of the meshes    then gpu_shadow_texture(), and ssdgs_scene_occlude() with their matrices
+       ssdgs_scene_light()          the splats' light maps; gpu_last_map() for the meshes' shader
+       the meshes                   into a texture of colour and one of depth, then gpu_scene_depth()
+       ssdgs_scene_render()         with an image whose planes are NULL: nothing is read back
+       a shader over all pixels     gpu_last_picture(): splats + transmittance x the meshes' colour */
 
 /* What the last frame has left, for shaders: planes of height x width floats, top row first, of red, green
    and blue (linear, premultiplied), transmittance, and median depth where ssdgs_image asked for it. Planes of
@@ -1569,7 +1576,7 @@ static void gpu_run_views(gpu *g, const ssdgs_frame *frame, const uint32_t *view
 static size_t gpu_most_slots(const gpu *g, const ssdgs_frame *frame) {
     const size_t limit = (size_t)1 << 28, bytes = (size_t)g->most < limit ? (size_t)g->most : limit,
                  slots = bytes / (sizeof(ssdgs_record) * (size_t)(frame->count > 0 ? frame->count : 1));
-    return slots < GPU_VIEWS ? slots : GPU_VIEWS;
+    return slots < GPU_VIEWS ? slots : (size_t)GPU_VIEWS;
 }
 
 /* The views from, up to before `to` that are not there. */
@@ -1834,7 +1841,7 @@ static ssdgs_result gpu_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage)
     if (!g->instance_room) g->instance_room = GPU_FIRST_ROOM;
     if (!g->waits || (stage == SSDGS_STAGE_PROJECT && !frame->batch[0])) gpu_begin_frame(g, frame);
     gpu_run_stages(g, frame, g->waits ? frame->batch[0] : 0, g->waits ? frame->batch[1] : frame->view_count,
-                   g->waits ? (int)stage : SSDGS_STAGE_PROJECT, (int)stage);
+                   g->waits ? (int)stage : (int)SSDGS_STAGE_PROJECT, (int)stage);
     if (ends) {
         if (!gpu_had_room(g, frame)) { /* what is counted is right even so: once is enough */
             g->p.total = GPU_VIEWS;

@@ -524,7 +524,7 @@ static void fuzz_scene(const unsigned char *data, size_t size) {
             if (edited[i]) p.objects[i].model = models[flags & 1];
         for (int i = 0; i < p.object_count && flags & 64; i++) p.objects[i].kept = draw_size(&in, 1, 3);
         p.passes = draw(&in);
-        ssdgs_occluder occluder = {occlude, &p, 0};
+        ssdgs_occluder occluder = {occlude, &p, 0, NULL, 0};
         occluder.revision = (uint64_t)p.passes;
         ssdgs_scene_occlude(scene, flags & 16 ? &occluder : NULL);
         if (flags & 32) check_shadow(&in, &p);
