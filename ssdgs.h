@@ -550,9 +550,9 @@ typedef struct ssdgs_image {
     ssdgs_real *scattering;        /* (h,w,3) */
     ssdgs_real *shadow;            /* (h,w) sum of weight x S, averaged over the lights */
     ssdgs_real *median_depth;      /* (h,w) camera depth where transmittance falls below 1/2; 0: nowhere */
-    const ssdgs_real *scene_depth; /* (h,w) read: camera depth of meshes and the like, which hide Gaussians
-                                      whose centres are behind them; NaN, 0 and less: nothing does. May be
-                                      NULL */
+    const ssdgs_real *scene_depth; /* (h,w) read: camera depth of meshes and the like, which hide what of a
+                                      Gaussian is behind them at the pixel; NaN, 0 and less: nothing does. May
+                                      be NULL */
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
@@ -1067,6 +1067,8 @@ typedef struct ssdgs_splat_view {
     ssdgs_record *record; /* (n) */
     ssdgs_real *depth;    /* (n) camera depth or distance to the light; negative = not drawn, see
                              ssdgs_camera.near_plane */
+    ssdgs_real *slope; /* (n, 2) of the camera, where pixels ask how deep it is there: depth + slope . (u, w),
+                          its mean depth there. NULL: they do not */
     /* SSDGS_STAGE_SORT */
     uint32_t *order; /* (visible) the Gaussians drawn, all of them: nearest first, ties by index */
     int visible;
@@ -1480,7 +1482,7 @@ typedef struct ssdgs__projection {
 
 typedef struct ssdgs__tile {
     const ssdgs_record *record;
-    const ssdgs_real *depth;
+    const ssdgs_real *depth, *slope;
     const ssdgs_tile_entry *list; /* (count) */
     const uint16_t *seen;         /* (count) micro-tiles that the walk saw blend, NULL before it */
     uint32_t count;
@@ -1570,7 +1572,7 @@ typedef struct ssdgs__adam_rate {
 /* clang-format off */
 #define SSDGS__KERNELS(K, T) \
     K(void, project, (const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, \
-        size_t begin, size_t end, ssdgs_record *record, ssdgs_real *depth)) \
+        size_t begin, size_t end, ssdgs_record *record, ssdgs_real *depth, ssdgs_real *slope)) \
     T(void, project_backward, (const ssdgs__projection *view, const ssdgs_real *gaussians, size_t stride, \
         size_t begin, size_t end, const ssdgs__project_gradient *d)) \
     K(uint32_t, bin, (const ssdgs_splat_view *view, const uint16_t *boxes, ssdgs_real log2_threshold, \
@@ -3297,7 +3299,7 @@ static int ssdgs__in_no_order(const ssdgs_model *model) {
 
 typedef struct ssdgs__view_memory {
     ssdgs__buffer light_map, map_tile; /* the view's own; the batches share the rest */
-    ssdgs__buffer record, depth, keys, order, instance, of_gaussian, start, list, seen, needed, sums,
+    ssdgs__buffer record, depth, slope, keys, order, instance, of_gaussian, start, list, seen, needed, sums,
         histogram;
     uint64_t chunk_room[SSDGS__BIN_CHUNKS];
 } ssdgs__view_memory;
@@ -4684,6 +4686,9 @@ static uint64_t ssdgs__views_key(const ssdgs_frame *frame, int light, const ssdg
     return key;
 }
 
+/* Whether the camera's pixels ask how deep a Gaussian is. */
+static int ssdgs__asks_depth(const ssdgs_frame *frame) { return frame->scene_depth || frame->median_depth; }
+
 static void ssdgs__begin_camera(ssdgs_frame *frame) {
     ssdgs__frame_memory *m = frame->memory;
     const ssdgs_camera *camera = &frame->camera;
@@ -4701,7 +4706,9 @@ static void ssdgs__begin_camera(ssdgs_frame *frame) {
     v.compensate = frame->options.antialias;
     v.variance = frame->settings.pixel_variance;
     memcpy(v.view, camera->view, sizeof v.view);
-    const uint64_t key = ssdgs__views_key(frame, -1, &v, 1);
+    const int asks = ssdgs__asks_depth(frame);
+    uint64_t key = ssdgs__views_key(frame, -1, &v, 1);
+    SSDGS__FOLD(key, asks);
     uint64_t walk = key;
     SSDGS__FOLD(walk, frame->options.stop);
     SSDGS__FOLD(walk, frame->options.max_error);
@@ -4983,7 +4990,8 @@ static void ssdgs__project_task(void *data, int index) {
         if (ssdgs__out_of_reach(frame, v->light, o)) continue;
         const ssdgs__projection p = ssdgs__projection_of(frame, o, v);
         frame->context->k->project(&p, o->gaussians.gaussians, o->gaussians.stride, (size_t)piece.begin,
-                                   (size_t)piece.end, v->record + o->first, v->depth + o->first);
+                                   (size_t)piece.end, v->record + o->first, v->depth + o->first,
+                                   v->slope ? v->slope + 2 * o->first : NULL);
         for (int i = 0; i < piece.gap; i++) v->depth[o->first + piece.end + i] = -1;
     }
 }
@@ -4997,6 +5005,8 @@ static ssdgs_result ssdgs__project(ssdgs_frame *frame) {
         if (v->cached) continue;
         SSDGS__RESERVE(m->record, v->record, ssdgs_record, n);
         SSDGS__RESERVE(m->depth, v->depth, ssdgs_real, n);
+        v->slope = NULL;
+        if (!i && ssdgs__asks_depth(frame)) SSDGS__RESERVE(m->slope, v->slope, ssdgs_real, 2 * n);
         v->tiles_x = (v->width + 15) / 16;
         v->tiles_y = (v->height + 15) / 16;
     }
@@ -5269,6 +5279,7 @@ static ssdgs__tile ssdgs__tile_of(const ssdgs_frame *frame, const ssdgs_splat_vi
     memset(&t, 0, sizeof t);
     t.record = v->record;
     t.depth = v->depth;
+    t.slope = v->slope;
     t.list = v->tile_list + v->tile_start[index];
     t.seen = walked ? v->tile_seen + v->tile_start[index] : NULL;
     t.count = v->tile_start[index + 1] - v->tile_start[index];
@@ -12837,7 +12848,7 @@ SSDGS__FI void F(project_lanes)(F(projection) * p, const ssdgs__projection *k, c
 }
 
 SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t stride, size_t begin,
-                          size_t end, ssdgs_record *record, R *depth) {
+                          size_t end, ssdgs_record *record, R *depth, R *slope) {
     const V log2e = V_SET(1.44269504088896341), unit = V_SET(0.84932180028801904); /* sqrt(log2(e) / 2) */
     F(rim) rim;
     F(rim_of)(k, &rim);
@@ -12870,6 +12881,17 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         V_STORE(depth + i, V_SEL(drawn, V_MUL(d, V_SET(k->depth_scale)), V_SET(-1)));
         if (!V_BITS(drawn)) continue;
         R fields[8][SSDGS__VW];
+        if (slope) { /* the covariance with z by U: depth is linear in the pixel's u and w */
+            V along[3];
+            for (int j = 0; j < 3; j++)
+                along[j] = V_MUL(V_MUL(p.s[j], V_SET(k->depth_scale)),
+                                 V_DOT3(V_SET(k->view[8]), V_SET(k->view[9]), V_SET(k->view[10]), p.r[j],
+                                        p.r[3 + j], p.r[6 + j]));
+            const V by_x = V_DOT(p.m[0], along), by_y = V_DOT(p.m[1], along);
+            V_STORE(fields[0], V_DIV(V_FMA(p.ux, by_x, V_MUL(p.uy, by_y)), unit));
+            V_STORE(fields[1], V_DIV(V_MUL(p.wy, by_y), unit));
+            for (size_t l = 0; l < 2 * SSDGS__VW; l++) slope[2 * i + l] = fields[l & 1][l / 2];
+        }
         V_STORE(fields[0], x);
         V_STORE(fields[1], y);
         V_STORE(fields[2], V_MUL(unit, p.ux));
@@ -13082,8 +13104,9 @@ SSDGS__FN uint32_t F(bin)(const ssdgs_splat_view *view, const uint16_t *boxes, R
 
 typedef struct F(batch) {
     ssdgs_record record[SSDGS__BATCH];
-    R distance[SSDGS__BATCH];     /* a light's walk: of the Gaussian, less the nearest one's; the camera's
-                                     depth, where it matters */
+    R distance[SSDGS__BATCH]; /* a light's walk: of the Gaussian, less the nearest one's; the camera's
+                                 depth, where it matters */
+    R slope[SSDGS__BATCH][2];
     uint32_t place[SSDGS__BATCH]; /* in the tile's lists */
     uint16_t mask[SSDGS__BATCH];
     uint64_t entries[16]; /* per micro-tile, which of the batch touch it */
@@ -13142,7 +13165,11 @@ SSDGS__FI int F(batch_gather)(F(batch) * batch, const ssdgs__tile *tile, uint32_
     for (; n < SSDGS__BATCH && *from < tile->count; ++*from) {
         const unsigned mask = tile->seen ? tile->seen[*from] : tile->list[*from].mask;
         if (!mask) continue;
-        if (tile->scene_depth || tile->median) batch->distance[n] = tile->depth[tile->list[*from].gaussian];
+        if (tile->scene_depth || tile->median) {
+            const size_t gaussian = tile->list[*from].gaussian;
+            batch->distance[n] = tile->depth[gaussian];
+            memcpy(batch->slope[n], tile->slope + 2 * gaussian, sizeof batch->slope[n]);
+        }
         F(batch_add)(batch, n++, tile, *from, mask);
     }
     F(batch_transpose)(batch, n);
@@ -13161,9 +13188,15 @@ SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V
     return V_SEL(*drawn, V_MIN(*raw, V_SET(SSDGS__ALPHA_MAX)), V_SET(0));
 }
 
+/* The mean depth of a Gaussian at VW pixels. */
+SSDGS__FI V F(depth_at)(const F(batch) * batch, int index, V u, V w) {
+    return V_FMA(V_SET(batch->slope[index][0]), u,
+                 V_FMA(V_SET(batch->slope[index][1]), w, V_SET(batch->distance[index])));
+}
+
 /* alpha, but 0 and not drawn where the entry is not nearer than scene_depth. */
-SSDGS__FI V F(in_front)(const ssdgs__tile *tile, int micro, int v, R depth, V alpha, VM *drawn) {
-    const VM nearer = V_LT(V_SET(depth), V_LOAD(tile->scene_depth + micro * 16 + v * SSDGS__VW));
+SSDGS__FI V F(in_front)(const ssdgs__tile *tile, int micro, int v, V depth, V alpha, VM *drawn) {
+    const VM nearer = V_LT(depth, V_LOAD(tile->scene_depth + micro * 16 + v * SSDGS__VW));
     *drawn = V_AND(*drawn, nearer);
     return V_SEL(nearer, alpha, V_SET(0));
 }
@@ -13228,7 +13261,7 @@ SSDGS__FN void F(walk_camera)(const ssdgs__tile *tile, uint16_t *blends, unsigne
                     VM drawn;
                     V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     if (tile->scene_depth)
-                        alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
+                        alpha = F(in_front)(tile, micro, v, F(depth_at)(&batch, index, u, w), alpha, &drawn);
                     const VM blended = V_AND(drawn, V_GE(t[v], stop));
                     any |= V_BITS(blended);
                     if (thrifty &&
@@ -13611,7 +13644,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                     VM drawn, live = V_GE(t[v], stop);
                     V alpha = F(alpha)(batch.record + index, px[v], py[v], threshold, &u, &w, &raw, &drawn);
                     if (tile->scene_depth)
-                        alpha = F(in_front)(tile, micro, v, batch.distance[index], alpha, &drawn);
+                        alpha = F(in_front)(tile, micro, v, F(depth_at)(&batch, index, u, w), alpha, &drawn);
                     V_STORE(weight[used] + v * SSDGS__VW, V_SEL(live, V_MUL(alpha, t[v]), V_SET(0)));
                     const V before = t[v];
                     t[v] = V_FNMA(alpha, t[v], t[v]);
@@ -13619,7 +13652,7 @@ SSDGS__FI void F(composite_layers)(const int layers, const ssdgs__tile *tile, co
                     if (tile->median) {
                         R *to = tile->median + micro * 64 + v * SSDGS__VW;
                         const VM fell = V_AND(V_AND(live, V_GE(before, V_SET(0.5))), V_LT(t[v], V_SET(0.5)));
-                        V_STORE(to, V_SEL(fell, V_SET(batch.distance[index]), V_LOAD(to)));
+                        V_STORE(to, V_SEL(fell, F(depth_at)(&batch, index, u, w), V_LOAD(to)));
                     }
                 }
                 used += (int)(ours >> index & 1);

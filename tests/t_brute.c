@@ -1387,8 +1387,8 @@ static void test_conic(int step) {
                 p.log2_threshold = -8, p.width = p.height = SCREEN, p.variance = (ssdgs_real)0.1;
                 p.depth_scale = p.presence = 1;
                 int n = fill_turned(pow(10, size), pow(10, aspect), step);
-                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record,
-                                           depth);
+                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record, depth,
+                                           NULL);
                 while (n--) {
                     const ssdgs_record *r = record + n;
                     const double got[3] = {(double)r->ux, (double)r->uy, (double)r->wy};
@@ -1423,7 +1423,7 @@ static void test_conic(int step) {
         fill_turned(1e10, 1, 90);
         for (int i = 0; i < 16; i++) /* hardly above the threshold: a box of no size */
             turned[SSDGS_OPACITY][i] = (ssdgs_real)(1e-5 - log(254.0));
-        ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, 16, record, depth);
+        ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, 16, record, depth, NULL);
         CHECK(depth[0] < 0);
     }
     printf("conic: %.3g, exponent %.3g, of needles %.3g\n", worst, off[0], off[1]);
@@ -1467,8 +1467,8 @@ static void test_masks(int step) {
                     turned[SSDGS_POSITION + 1][i] =
                         (ssdgs_real)(2 * pow(10, size) / FOCAL * sin(i * step * PI / 180));
                 }
-                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record,
-                                           depth);
+                ssdgs__table(isa)->project(&p, turned[0], TURNS, 0, (size_t)(n + 15) / 16 * 16, record, depth,
+                                           NULL);
                 for (int i = 0; i < n; i++) {
                     const ssdgs_record *r = record + i;
                     uint16_t boxes[4 * TURNS];

@@ -668,7 +668,7 @@ static void test_held(void) {
 static double log_opacity(const ssdgs__projection *k, const ssdgs_real *gaussian) {
     ssdgs_record record;
     ssdgs_real depth;
-    context->k->project(k, gaussian, 1, 0, 1, &record, &depth);
+    context->k->project(k, gaussian, 1, 0, 1, &record, &depth, NULL);
     CHECK(depth > 0);
     return record.log2_opacity * log(2);
 }

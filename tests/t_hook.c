@@ -49,6 +49,7 @@ static void find_arrays(device *d, ssdgs_frame *f, int stage) {
         const int done = v->cached ? SSDGS_STAGE_WALK : stage,
                   own = !v->cached || (i == 0 && f->last > SSDGS_STAGE_WALK); /* maps alone stay of lights */
         if (own && done >= SSDGS_STAGE_PROJECT) ADD(v->record, n, 0), ADD(v->depth, n, 0);
+        if (own && done >= SSDGS_STAGE_PROJECT) ADD(v->slope, 2 * n, 0);
         if (own && done >= SSDGS_STAGE_SORT) ADD(v->order, v->visible, 1);
         if (own && done >= SSDGS_STAGE_BIN) {
             ADD(v->instance, v->instance_room, 1);

@@ -18,7 +18,7 @@ void meet(float weight, uint i) {
     float alpha = alpha_of(weight), w = alpha * t, before = t;
     for (uint l = 0u; l < at_once; l++) sums[l] += w * values[i * at_once + l].rgb;
     t = fma(-alpha, t, t);
-    if (before >= 0.5 && t < 0.5) half_depth = fronts[i];
+    if (before >= 0.5 && t < 0.5) half_depth = depth_at(i, centre());
 }
 int material_of(uint gaussian) { return sharing == 0u ? 0 : objects[object_at(gaussian)].of.y; }
 vec4 value_of(uint which, uint gaussian) {

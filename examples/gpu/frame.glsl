@@ -86,6 +86,7 @@ layout(std430, binding = 0) readonly buffer tables {
 };
 layout(std430, binding = 1) readonly buffer object_ofs { uint object_of[]; }; /* of 64 Gaussians */
 layout(std430, binding = 15) readonly buffer outsides { float outside[]; }; /* shadow maps; scene depth */
+layout(std430, binding = 14) buffer slopes { vec2 slope[]; }; /* as in ssdgs_splat_view, of the camera */
 layout(std430, binding = 2) buffer facts_ { fact facts[]; }; /* of each view; behind 256 totals */
 
 uint object_at(uint g) { return object_count > 1u ? object_of[g >> 6u] : 0u; }

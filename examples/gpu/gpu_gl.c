@@ -231,10 +231,11 @@ typedef enum gpu_program {
 } gpu_program;
 
 enum {
-    GPU_COMMON = 3,   /* bindings that all programs have: tables, objects of Gaussians, facts */
-    GPU_OUTSIDE = 15, /* and this one: the scene's depth, shadow maps */
+    GPU_COMMON = 3,  /* bindings that all programs have: tables, objects of Gaussians, facts */
+    GPU_SLOPES = 14, /* and these two: slopes; shadow maps, the scene's depth */
+    GPU_OUTSIDE = 15,
     GPU_BINDINGS = 16,
-    GPU_MOST_BLOCKS = 13, /* storage blocks of a program: SHADE's */
+    GPU_MOST_BLOCKS = 14, /* storage blocks of a program: SHADE's */
     GPU_LAMPS = 64,
     GPU_VIEWS = 256,
     GPU_MAPS = 64,
@@ -289,7 +290,7 @@ typedef struct gpu_fact {
 typedef struct gpu_frame {
     gpu_set camera,
         others; /* of the camera and of lights that move with it; of lights while the camera rests */
-    gpu_buffer tables, object_of, facts, outside, masks;
+    gpu_buffer tables, object_of, facts, slopes, outside, masks;
     gpu_arena models; /* planes, networks, sky shares; floats */
     gpu_arena maps;   /* tiles of light maps */
     gpu_light light[GPU_LAMPS];
@@ -373,6 +374,7 @@ struct gpu {
     gpu_scratch scratch;
     size_t instance_room; /* of each set */
     int32_t columns;      /* the fewest that any object's networks have */
+    uint32_t deep;        /* 1: the camera's view has slopes */
     uint32_t revisions;   /* that flux has had so far */
     uint64_t transported; /* what transport depends on besides flux */
     uint64_t outside;     /* which shadow maps the device has */
@@ -618,7 +620,7 @@ gpu *gpu_create(void *(*find)(const char *name), char *message, size_t size) {
         g->frame.maps.unit = 256 * sizeof(ssdgs_light_pixel);
         if (!find && !gpu_load_egl(&g->egl)) missing = "libEGL.so.1";
         else if (find ? gpu_load_gl(g, find) : gpu_find_display(g)) return g;
-        else missing = "OpenGL 4.3 with 13 storage blocks a program";
+        else missing = "OpenGL 4.3 with 14 storage blocks a program";
     }
     if (size) snprintf(message, size, "no GPU: there is no %s", missing);
     if (g) memset(&g->gl, 0, sizeof g->gl);
@@ -799,6 +801,7 @@ static void gpu_run(gpu *g, gpu_program which, const gpu_parameters *p, const gp
     const gpu_buffer *const common[GPU_COMMON] = {&f->tables, &f->object_of, &f->facts};
     for (uint32_t i = 0; i < GPU_COMMON; i++)
         g->gl.BindBufferBase(GPU_GL_SHADER_STORAGE_BUFFER, i, common[i]->name);
+    g->gl.BindBufferBase(GPU_GL_SHADER_STORAGE_BUFFER, GPU_SLOPES, f->slopes.name);
     g->gl.BindBufferBase(GPU_GL_SHADER_STORAGE_BUFFER, GPU_OUTSIDE, f->outside.name);
     for (uint32_t i = 0; buffers[i]; i++)
         g->gl.BindBufferBase(GPU_GL_SHADER_STORAGE_BUFFER, GPU_COMMON + i, buffers[i]->name);
@@ -1632,6 +1635,7 @@ static void gpu_set_frame(gpu *g, const ssdgs_frame *frame) {
     if (g->result) return;
     gpu_set_parameters(g, frame);
     gpu_reserve(g, &f->facts, (GPU_VIEWS + GPU_TOTALS) * sizeof(gpu_fact));
+    gpu_reserve(g, &f->slopes, n * 2 * sizeof(float));
     gpu_reserve(g, &f->visibility, all);
     gpu_reserve(g, &f->depth_cue, frame->depth_cue ? all : 16);
     gpu_reserve(g, &f->flux, frame->flux ? all : 16);
@@ -1649,10 +1653,12 @@ static void gpu_begin_frame(gpu *g, const ssdgs_frame *frame) {
     for (int i = 0; i < frame->view_count; i++) {
         ssdgs_splat_view *v = frame->views + i;
         if (v->record || g->owner != frame->memory) v->cached = 0;
+        if (!i && (g->p.hides | g->p.median) != g->deep) v->cached = 0; /* slopes are there, or not */
         if (!i && v->cached == 2 && g->p.hides) v->cached = 1; /* what hides may be another texture's */
         v->record = NULL;
         if (!v->cached) v->light_map = NULL;
     }
+    g->deep = g->p.hides | g->p.median;
 }
 
 /* The stages, of the views from, up to before `to`; without waiting all of them at once. */
@@ -1913,10 +1919,10 @@ static void gpu_delete_all(gpu *g) {
                              sizeof(gpu_scratch) / sizeof(gpu_buffer)};
     gpu_frame *f = &g->frame;
     gpu_buffer *const rest[] = {
-        &f->tables,      &f->object_of, &f->facts,  &f->outside,   &f->masks,      &f->models.buffer,
-        &f->maps.buffer, &f->seen,      &f->tally,  &f->of_object, &f->ahead,      &f->visibility,
-        &f->depth_cue,   &f->flux,      &f->shaded, &f->layers,    &f->neighbours, &f->nodes,
-        &f->transport,   &f->arrived,   &f->planes};
+        &f->tables,        &f->object_of,   &f->facts,   &f->outside, &f->slopes,    &f->masks,
+        &f->models.buffer, &f->maps.buffer, &f->seen,    &f->tally,   &f->of_object, &f->ahead,
+        &f->visibility,    &f->depth_cue,   &f->flux,    &f->shaded,  &f->layers,    &f->neighbours,
+        &f->nodes,         &f->transport,   &f->arrived, &f->planes};
     for (int i = 0; i < 2; i++) g->gl.DeleteBuffers(1, &own[i]->name);
     for (int i = 0; i < 2; i++)
         for (size_t j = 0; j < counts[i]; j++) g->gl.DeleteBuffers(1, &more[i][j].name);

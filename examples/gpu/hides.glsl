@@ -1,6 +1,6 @@
 /* Where the picture's scene depth hides what lies behind it. */
 
-shared float fronts[window]; /* depths of the window's entries */
+shared vec3 fronts[window]; /* of the window's entries: slope, depth */
 float behind; /* of the pixel: what is not nearer is hidden */
 void find_behind() {
     behind = 3.4028235e38;
@@ -10,5 +10,15 @@ void find_behind() {
     if (scene_raw != 0u) at = 1 / dot(unseen, vec4(pixel(), at, 1));
     if (is_number(at) && at > 0) behind = at; /* what is none hides nothing */
 }
-void load_front(uint place, uint gaussian) { fronts[place] = depth[base + gaussian]; }
-bool is_open(uint i) { return hides == 0u || fronts[i % window] < behind; }
+void load_front(uint place, uint gaussian) {
+    vec2 own = hides + median > 0u ? slope[gaussian] : vec2(0);
+    fronts[place] = vec3(own, depth[base + gaussian]);
+}
+/* An entry's mean depth at a pixel. */
+float depth_at(uint i, vec2 at) {
+    uint some = i % window;
+    vec2 d = at - splats[some].xy;
+    return fronts[some].z + fronts[some].x * (splats[some].z * d.x + splats[some].w * d.y) +
+        fronts[some].y * (spreads[some].x * d.y);
+}
+bool is_open(uint i) { return hides == 0u || depth_at(i, centre()) < behind; }

@@ -49,9 +49,9 @@ void main() {
                   dot(view[2].xyz, position) + view[2].w);
     mat3 r = rotation(raw);
     float inverse_z = parallel ? 1 : 1 / max(t.z, near_plane);
-    vec2 slope = parallel ? vec2(0) : t.xy * inverse_z;
-    vec3 m0 = scale * (focal.x * inverse_z * (view[0].xyz - slope.x * view[2].xyz) * r);
-    vec3 m1 = scale * (focal.y * inverse_z * (view[1].xyz - slope.y * view[2].xyz) * r);
+    vec2 slant = parallel ? vec2(0) : t.xy * inverse_z;
+    vec3 m0 = scale * (focal.x * inverse_z * (view[0].xyz - slant.x * view[2].xyz) * r);
+    vec3 m1 = scale * (focal.y * inverse_z * (view[1].xyz - slant.y * view[2].xyz) * r);
     float a = dot(m0, m0), b = dot(m0, m1), c = dot(m1, m1);
     vec3 across = vec3(difference(m0.y, m1.z, m0.z, m1.y), difference(m0.z, m1.x, m0.x, m1.z),
                        difference(m0.x, m1.y, m0.y, m1.x));
@@ -65,8 +65,8 @@ void main() {
     if (!parallel) {
         vec3 axis = scale * inverse_z * (view[2].xyz * r);
         vec2 low = -middle / focal, high = (edges - middle) / focal;
-        vec2 edge = clamp(slope, max(min(low, -1.0), -1e9), min(max(high, 1.0), 1e9));
-        vec2 ratio = (1 + edge * edge) / (1 + slope * slope);
+        vec2 edge = clamp(slant, max(min(low, -1.0), -1e9), min(max(high, 1.0), 1e9));
+        vec2 ratio = (1 + edge * edge) / (1 + slant * slant);
         float beside = ratio.x * ratio.y * ratio.x * ratio.y;
         float deep = clamp((dot(axis, axis) - 0.02) / 0.04, 0.0, 1.0);
         float inverse_near = near_plane > 1e-30 ? 1 / near_plane : 1e30;
@@ -84,5 +84,10 @@ void main() {
     depth[at] = drawn ? scale_of * (v.kind.z > 0 ? length(t) : t.z) : -1;
     float ux = sqrt(0.5 * log2e * ((c + h) / det)), uy = -ux * (b / (c + h)),
         wy = sqrt(0.5 * log2e / (c + h));
+    if (!of_light && hides + median > 0u) {
+        vec3 along = scale * scale_of * (view[2].xyz * r);
+        float by_x = dot(m0, along), by_y = dot(m1, along);
+        slope[i] = vec2(ux * by_x + uy * by_y, wy * by_y) / (0.5 * log2e);
+    }
     if (drawn) record[at] = splat(centre.x, centre.y, ux, uy, wy, log2_opacity, extent.x, extent.y);
 }
