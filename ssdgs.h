@@ -128,7 +128,7 @@ SCENES, as engines have them: examples/engine.c is one
       draw the meshes, with shadows of splats by ssdgs_scene_shadow(), or in a shader by
                                      ssdgs_scene_light_map()
       ssdgs_scene_render()           with the meshes' depth as image.scene_depth, which
-                                     ssdgs_depth_from_buffer() makes, their shadows on splats by
+                                     ssdgs_depth_from_buffer() makes, and their shadow maps by
                                      ssdgs_scene_occlude()
       ssdgs_blend_pixels()           over the engine's framebuffer; or ssdgs_to_pixels() and the GPU's
                                      blending, best of SSDGS_RGBA16F + SSDGS_PREMULTIPLIED
@@ -168,8 +168,8 @@ MACROS, defined before the header; those with * in every file that includes it
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
   unbake.h models that take light of plain splats, splats.h reads packed ones, adopt.h mends edited models,
-  olat.h reads datasets, images.h PNG and OpenEXR; gpu/ has the stages in OpenGL 4.3, on a thread that has no
-  OpenGL context of its own. Nothing finds cameras or lights (options.refine corrects small errors), traces
+  olat.h reads datasets, images.h PNG and OpenEXR; gpu/ draws scenes in OpenGL 4.3, in a context
+  of its own or in an engine's. Nothing finds cameras or lights (options.refine corrects small errors), traces
   light between objects, undistorts lenses, or compresses models.
 
 CHANGES, for programs written for 0.2.4
