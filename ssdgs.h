@@ -540,19 +540,20 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
    color. Beside an object with deferred highlights, scattering has all light of those without, and baked and
    kept colours but for lights' shares of them, which diffuse has. */
 typedef struct ssdgs_image {
-    int stride;                    /* pixels from row to row; 0 = camera width */
-    ssdgs_real *color;             /* (h,w,3) */
-    ssdgs_real *alpha;             /* (h,w) */
-    ssdgs_real *depth;             /* (h,w) sum of weight x camera depth: divide by alpha */
-    ssdgs_real *normal;            /* (h,w,3) sum of weight x normal, world */
-    ssdgs_real *diffuse;           /* (h,w,3) */
-    ssdgs_real *specular;          /* (h,w,3) */
-    ssdgs_real *scattering;        /* (h,w,3) */
-    ssdgs_real *shadow;            /* (h,w) sum of weight x S, averaged over the lights */
-    ssdgs_real *median_depth;      /* (h,w) camera depth where transmittance falls below 1/2; 0: nowhere */
-    const ssdgs_real *scene_depth; /* (h,w) read: camera depth of meshes and the like, which hide what of a
-                                      Gaussian is behind them at the pixel; NaN, 0 and less: nothing does. May
-                                      be NULL */
+    int stride;               /* pixels from row to row; 0 = camera width */
+    ssdgs_real *color;        /* (h,w,3) */
+    ssdgs_real *alpha;        /* (h,w) */
+    ssdgs_real *depth;        /* (h,w) sum of weight x camera depth: divide by alpha */
+    ssdgs_real *normal;       /* (h,w,3) sum of weight x normal, world */
+    ssdgs_real *diffuse;      /* (h,w,3) */
+    ssdgs_real *specular;     /* (h,w,3) */
+    ssdgs_real *scattering;   /* (h,w,3) */
+    ssdgs_real *shadow;       /* (h,w) sum of weight x S, averaged over the lights */
+    ssdgs_real *median_depth; /* (h,w) camera depth, at the pixel, of the Gaussian that takes transmittance
+                                 below 1/2; 0: none does */
+    const ssdgs_real *scene_depth; /* (h,w) read: camera depth, z, of meshes and the like: a Gaussian is not
+                                      drawn at pixels where its mean depth is behind it. NaN, 0 and less:
+                                      nothing is hidden. May be NULL */
 } ssdgs_image;
 
 typedef struct ssdgs_render_options {
@@ -652,24 +653,28 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
                                           int light_count, const ssdgs_render_options *options,
                                           const ssdgs_image *image, ssdgs_render_stats *stats);
 
-/* A shadow map of an engine's meshes: depths seen from a light. Cascades and a cube's faces are several maps
-   of one light: a place is looked up, between four pixels, in the first that has it. */
+/* A shadow map of an engine's meshes: depths seen from the light's position or, directional, along its
+   direction. Several of one light, cascades or a cube's faces, are asked in their order, finer ones first:
+   the first decides that has the place in its picture and not beyond its far end. Where none has, nothing is
+   hidden. Four pixels are compared. */
 typedef struct ssdgs_shadow_map {
-    int light;             /* its number in the frame */
+    int light;             /* its number in the frame; one that is `unshadowed` ignores the map */
     int width, height;     /* px */
     int flags;             /* of matrix: SSDGS_COLUMN_MAJOR, SSDGS_CLIP_Y_DOWN, SSDGS_CLIP_Z_FROM_0 */
-    const float *depth;    /* (height,width) as for ssdgs_depth_from_buffer(); may be reversed. NULL: desc.gpu
-                              has them, and where the CPU draws nothing is hidden */
-    ptrdiff_t pitch;       /* as there */
-    uint64_t revision;     /* another one whenever depths differ */
-    ssdgs_real matrix[16]; /* (4,4) clip = projection x view of the light, x a place in the world */
-    ssdgs_real bias, range; /* world units. bias: how far behind a surface nothing is in its shadow yet.
-                               range: above 0: depth has distances from the light / range instead */
+    uint64_t revision;     /* another one whenever depths change: else Gaussians keep the last ones' shadow */
+    ssdgs_real matrix[16]; /* (4,4) world to the light's clip space, w above 0 ahead of it; not to 0 .. 1 */
+    ssdgs_real bias;       /* world units: a place is dark only if it is farther behind a surface */
+    ssdgs_real range; /* of point lights and spots: above 0: depth is the distance from the light / range; 0:
+                         it is clip space's */
+    const float *depth; /* (height,width) 0 .. 1, may be reversed; the clear value where nothing is. Top row
+                           first: of OpenGL's textures point to the last row, and let pitch be negative. NaN
+                           hides nothing. NULL: only desc.gpu has them, what the CPU draws gets no shadow */
+    ptrdiff_t pitch;    /* bytes from row to row */
 } ssdgs_shadow_map;
 /* What else takes light from the objects, meshes for instance. */
 typedef struct ssdgs_occluder {
     /* Multiplies fraction (count) by what of light number `light` passes on the way to points (count,3),
-       world. Several threads call it at once. NULL: maps say it */
+       world. Several threads call it at once. NULL: only maps do; with both, both do */
     void (*shadow)(void *user, int light, const ssdgs_real *points, int count, ssdgs_real *fraction);
     void *user;
     uint64_t revision; /* of shadow: another one whenever its answer for a light may differ; until then what
@@ -3650,8 +3655,9 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
                                             : !buffer   ? "buffer"
                                                         : "depth")
                               : ssdgs__projection_matrix(context, projection, flags, p);
-    if (!result && (width < 1 || height < 1))
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "depth buffer: %d x %d pixels", width, height);
+    if (!result && (width < 1 || height < 1 || (height > 1 && pitch < 4 * width && -pitch < 4 * width)))
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "depth buffer: %d x %d pixels, pitch %ld", width,
+                             height, (long)pitch);
     if (!result && p[11] == 0)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                              "depth buffer: row 2, column 3 of projection is 0: its depths are all the same");
@@ -4151,7 +4157,10 @@ static ssdgs_result ssdgs__occluder_check(ssdgs_context *context, const ssdgs_oc
         const ssdgs_shadow_map *m = occluder->maps + i;
         SSDGS__REFUSE(m->width < 1 || m->width > 32768 || m->height < 1 || m->height > 32768,
                       "shadow map %d: %d x %d pixels, where 1 to 32768 are possible", i, m->width, m->height);
-        SSDGS__REFUSE(!m->depth && !context->gpu.user, "shadow map %d: depth is NULL", i);
+        SSDGS__REFUSE(!m->depth && !context->gpu.stage[SSDGS_STAGE_WALK], "shadow map %d: depth is NULL", i);
+        SSDGS__REFUSE(m->height > 1 && m->depth && m->pitch < 4 * m->width && -m->pitch < 4 * m->width,
+                      "shadow map %d: pitch = %ld, where a row has %ld bytes", i, (long)m->pitch,
+                      4 * (long)m->width);
         SSDGS__REFUSE(m->light < 0 || (m->flags & ~known), "shadow map %d: light = %d, flags = %d", i,
                       m->light, m->flags);
         SSDGS__REFUSE(!(m->bias >= 0 && ssdgs__finite(m->bias) && m->range >= 0 && ssdgs__finite(m->range)),
@@ -4748,7 +4757,8 @@ static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted
     if (frame->occluder && frame->occluder->shadow)
         key = ssdgs__fold(key, frame->occluder, offsetof(ssdgs_occluder, maps));
     for (int i = 0; frame->occluder && i < frame->occluder->map_count; i++)
-        if (frame->occluder->maps[i].light == index) SSDGS__FOLD(key, frame->occluder->maps[i]);
+        if (frame->occluder->maps[i].light == index) /* where its depths lie does not matter */
+            key = ssdgs__fold(key, frame->occluder->maps + i, offsetof(ssdgs_shadow_map, depth));
     own->wanted = ssdgs__casts(light) ? wanted : 0;
     own->kept = key == own->key && !(own->wanted & ~own->made);
     own->key = key;
@@ -5386,11 +5396,13 @@ static ssdgs_real ssdgs__shadow_map_at(const ssdgs_shadow_map *m, const ssdgs_re
     double x = (1 + at[0] / at[3]) / 2 * w - 0.5, y = (1 + down * at[1] / at[3]) / 2 * h - 0.5;
     if (!(at[3] > 0 && x >= -0.5 && x <= w - 0.5 && y >= -0.5 && y <= h - 0.5)) return -1;
     const int reversed = !(m->range > 0) && by[2] * at[3] < at[2] * by[3];
-    const double z = (at[2] - (double)m->bias * by[2]) / (at[3] - (double)m->bias * by[3]);
-    double d = m->range > 0                     ? (distance - (double)m->bias) / (double)m->range
+    const double bias = (double)m->bias, w_there = at[3] - bias * by[3], z = (at[2] - bias * by[2]) / w_there;
+    double d = m->range > 0                     ? (distance - bias) / (double)m->range
                : m->flags & SSDGS_CLIP_Z_FROM_0 ? z
                                                 : (1 + z) / 2;
-    d = d > 1 ? 1 : d > 0 ? d : 0; /* beyond what the map has seen there is nothing */
+    const int beyond = reversed ? d < 0 : d > 1;
+    if (!(m->range > 0) && !(w_there > 0)) return 1; /* nearer to the light than the bias */
+    d = d > 1 ? 1 : d > 0 ? d : 0;
     x = x > 0 ? x : 0, y = y > 0 ? y : 0;
     for (int i = 0; i < 4; i++) {
         const int column = (int)x + (i & 1), row = (int)y + (i >> 1);
@@ -5401,7 +5413,7 @@ static ssdgs_real ssdgs__shadow_map_at(const ssdgs_shadow_map *m, const ssdgs_re
         const double there = (double)value;
         passed += (reversed ? there > d : there < d) ? 0 : part;
     }
-    return (ssdgs_real)passed;
+    return beyond && passed > 0.999999 ? -1 : (ssdgs_real)passed;
 }
 
 /* Whether the occluder has something to say of a light. */
@@ -7733,6 +7745,11 @@ static ssdgs_result ssdgs__run_stages(ssdgs_frame *frame, int first, int last) {
         result = ssdgs__run_each(frame, first > SSDGS_STAGE_WALK ? first : SSDGS_STAGE_WALK + 1, last);
     if (!result && gpu->fetch) result = gpu->fetch(gpu->user, frame, SSDGS_STAGE_COUNT);
     if (finds) {
+        for (int i = 1; i < frame->view_count;
+             i++) { /* a hook may have found less there than was made once */
+            ssdgs__light_memory *own = ssdgs__light_memories(frame) + frame->views[i].light;
+            if (!frame->views[i].cached) own->made = own->wanted;
+        }
         m->ready = !result && !frame->training;
         m->mapped = m->ready && frame->maps ? frame->light_count : 0;
         m->bias = frame->bias[1];
@@ -11510,11 +11527,6 @@ static ssdgs_result ssdgs__trainer_check(const ssdgs_trainer *trainer) {
                      "another trainer or ssdgs_model_sort() has moved the Gaussians of this trainer's model");
 }
 
-/* What a step reports of its photograph, or of a batch on average. */
-typedef struct ssdgs__drawn {
-    double loss, psnr, shaded;
-} ssdgs__drawn;
-
 /* Whether photographs have ambient light, or may have. */
 static int ssdgs__sees_ambient(const ssdgs_trainer *trainer) {
     const ssdgs_real *ambient = trainer->model->settings.ambient;
@@ -11526,7 +11538,7 @@ static int ssdgs__sees_ambient(const ssdgs_trainer *trainer) {
    moves. */
 static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step *step, int iteration,
                                       int photo, ssdgs_frame *frame,
-                                      double correction_gradient[SSDGS__CORRECTIONS], ssdgs__drawn *drawn) {
+                                      double correction_gradient[SSDGS__CORRECTIONS], double drawn[3]) {
     const ssdgs_train_options *o = &trainer->options;
     const double *correction = trainer->corrections[photo].value;
     const int shown = trainer->transparent[photo]; /* a few soft pixels do not hide a backdrop */
@@ -11562,9 +11574,7 @@ static ssdgs_result ssdgs__draw_photo(ssdgs_trainer *trainer, const ssdgs__step 
             trainer->context,
             "the first photograph drawn has no Gaussian in view: do the camera's axes, position, near_plane "
             "and the bounds suit each other?");
-    drawn->loss = values.loss;
-    drawn->psnr = ssdgs__psnr(values.mse);
-    drawn->shaded = frame->shaded_count;
+    drawn[0] = values.loss, drawn[1] = ssdgs__psnr(values.mse), drawn[2] = frame->shaded_count;
     return SSDGS_OK;
 }
 
@@ -11604,7 +11614,7 @@ static ssdgs_result ssdgs__sky_shares_step(ssdgs_trainer *trainer) {
    part in the sum, so that the others hear of it. */
 static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step *step, const int *photos,
                                       ssdgs_frame *frame, double *correction_gradient,
-                                      const ssdgs_real **statistics, ssdgs__drawn *drawn) {
+                                      const ssdgs_real **statistics, double drawn[3]) {
     ssdgs_context *context = trainer->context;
     const ssdgs_sum *sum = &trainer->options.sum;
     const ssdgs__batch_layout at = ssdgs__batch_layout_of(trainer);
@@ -11623,9 +11633,7 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
                                    correction_gradient + SSDGS__CORRECTIONS * b, drawn);
         if (failed) break;
         ssdgs__gather_statistics(trainer, frame, trainer->small_object_gain[photos[b]], out + at.statistics);
-        out[1] = (ssdgs_real)drawn->loss;
-        out[2] = (ssdgs_real)drawn->psnr;
-        out[3] = (ssdgs_real)drawn->shaded;
+        for (int j = 0; j < 3; j++) out[1 + j] = (ssdgs_real)drawn[j];
         for (int j = SSDGS__CORRECTIONS * b; j < SSDGS__CORRECTIONS * (b + 1); j++)
             out[at.correction_gradient + (size_t)j] = (ssdgs_real)correction_gradient[j];
         memcpy(out + at.gradient, frame->gradient, SSDGS_CHANNELS * trainer->stride * sizeof *out);
@@ -11645,9 +11653,7 @@ static ssdgs_result ssdgs__draw_batch(ssdgs_trainer *trainer, const ssdgs__step 
         return ssdgs__fail(context, SSDGS_ERR_CANCELLED, "iteration %d refused: another process failed",
                            trainer->run.iteration);
     const ssdgs_real mean = 1 / (ssdgs_real)batch;
-    drawn->loss = (double)(mean * sums[1]);
-    drawn->psnr = (double)(mean * sums[2]);
-    drawn->shaded = (double)(mean * sums[3]);
+    for (int i = 0; i < 3; i++) drawn[i] = (double)(mean * sums[1 + i]);
     for (int j = 0; j < SSDGS__CORRECTIONS * batch; j++)
         correction_gradient[j] = (double)sums[at.correction_gradient + (size_t)j];
     for (size_t k = 0; k < at.globals - at.gradient; k++) frame->gradient[k] = mean * sums[at.gradient + k];
@@ -11710,15 +11716,14 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
     double correction_gradient[SSDGS__CORRECTIONS * SSDGS__MAX_BATCH];
     for (int i = 0; i < o->batch; i++) photos[i] = ssdgs__photo_of(trainer, before + i);
     const ssdgs_real *statistics = NULL;
-    ssdgs__drawn drawn;
+    double drawn[3]; /* loss, PSNR, Gaussians shaded: of a photograph, or of a batch on average */
     ssdgs_frame frame;
     if (o->batch > 1 || o->sum.add)
-        result = ssdgs__draw_batch(trainer, &step, photos, &frame, correction_gradient, &statistics, &drawn);
+        result = ssdgs__draw_batch(trainer, &step, photos, &frame, correction_gradient, &statistics, drawn);
     else {
         result = ssdgs__sky_shares_step(trainer);
         if (!result)
-            result =
-                ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, correction_gradient, &drawn);
+            result = ssdgs__draw_photo(trainer, &step, before, photos[0], &frame, correction_gradient, drawn);
     }
     if (result) return result;
     const int refines[4] = {(o->refine & SSDGS_REFINE_CAMERA) && step.t >= 5e3,
@@ -11756,10 +11761,10 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
         if (ssdgs__last_reset(o, after) > before) ssdgs__reset_opacity(trainer);
     }
     if (stats) {
-        stats->shaded = (int)(drawn.shaded + 0.5);
+        stats->shaded = (int)(drawn[2] + 0.5);
         stats->terms = step.terms;
-        stats->loss = drawn.loss;
-        stats->psnr = drawn.psnr;
+        stats->loss = drawn[0];
+        stats->psnr = drawn[1];
     }
     return result;
 }
@@ -12856,9 +12861,10 @@ SSDGS__FN void F(project)(const ssdgs__projection *k, const R *gaussians, size_t
         F(projection) p;
         F(project_lanes)(&p, k, gaussians + i, stride, V_LT(V_SET(1), V_SET(0)));
         F(fade)(k, &rim, &p);
-        if (k->presence < 1) /* transmittances of parts multiply to that of the whole */
-            p.opacity =
-                V_SUB(V_SET(1), V_EXP(V_MUL(V_SET(k->presence), V_LOG(V_MAX(p.clear, V_SET(1e-30))))));
+        if (k->presence < 1) { /* transmittances of parts multiply to that of the whole */
+            const V part = V_EXP(V_MUL(V_SET(k->presence), V_LOG(V_MAX(p.clear, V_SET(1e-30)))));
+            p.opacity = V_SEL(V_GE(p.clear, V_SET(0)), V_SUB(V_SET(1), part), p.opacity); /* NaN stays */
+        }
         V opacity = V_MUL(p.opacity, p.fade);
         if (k->compensate) opacity = V_MUL(opacity, V_SQRT(V_MUL(p.det0, p.inverse_det)));
         const V log2_opacity = V_MUL(V_LOG(V_MAX(opacity, V_SET(1e-30))), log2e);
@@ -13188,10 +13194,11 @@ SSDGS__FI V F(alpha)(const ssdgs_record *record, V px, V py, V log2_threshold, V
     return V_SEL(*drawn, V_MIN(*raw, V_SET(SSDGS__ALPHA_MAX)), V_SET(0));
 }
 
-/* The mean depth of a Gaussian at VW pixels. */
+/* The mean depth of a Gaussian at VW pixels, above 0. */
 SSDGS__FI V F(depth_at)(const F(batch) * batch, int index, V u, V w) {
-    return V_FMA(V_SET(batch->slope[index][0]), u,
-                 V_FMA(V_SET(batch->slope[index][1]), w, V_SET(batch->distance[index])));
+    return V_MAX(V_SET((R)0.001 * batch->distance[index]),
+                 V_FMA(V_SET(batch->slope[index][0]), u,
+                       V_FMA(V_SET(batch->slope[index][1]), w, V_SET(batch->distance[index]))));
 }
 
 /* alpha, but 0 and not drawn where the entry is not nearer than scene_depth. */

@@ -1516,6 +1516,130 @@ static void changes(int steps) {
     context = own;
 }
 
+/* Two scenes in turn on one device, with terms that are left out, lights that are dark for a frame, frames
+   that the CPU draws in between: each frame is the CPU's. */
+static void in_turn(void) {
+    enum { KINDS = 4, TURNS = 4 };
+    static picture pictures[2][KINDS][TURNS];
+    ssdgs_context *const own = context;
+    ssdgs_context_desc desc;
+    memset(&desc, 0, sizeof desc);
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    for (int i = 0; i < 2; i++) {
+        desc.gpu = i ? &hook : NULL;
+        if (!CHECK(!ssdgs_context_create(&desc, &context))) exit(1);
+        for (int kind = 0; kind < KINDS; kind++) {
+            ssdgs_settings s = small_settings();
+            ssdgs_scene *scenes[2];
+            if (kind == 3) s.asg = SSDGS_ASG_GEOMETRIC;
+            if (kind != 1) {
+                s.scattering.layers = s.shadow.layers = 0;
+                for (int c = 0; c < 3; c++) s.medium.scattering[c] = 10, s.medium.absorption[c] = 1;
+            }
+            ssdgs_model *models[2] = {cloud(&s, 0, 1000, 0.5), cloud(&s, 5000, 1000, 0.2)};
+            for (int m = 0; m < 2; m++) CHECK(!ssdgs_model_sort(models[m]));
+            for (int m = 0; m < 2; m++) CHECK(!ssdgs_scene_create(context, scenes + m));
+            for (int f = 0; f < TURNS; f++) {
+                const int other = kind < 3 && f == 1;
+                ssdgs_light lights[2] = {point_light(2, 3, 4), point_light(-3, 1, 2)};
+                ssdgs_render_options options = ssdgs_render_options_default();
+                const ssdgs_object object = ssdgs_object_default(models[other]);
+                const ssdgs_camera camera = camera_from(2, 0.3, 1);
+                picture *p = pictures[i][kind] + f;
+                ssdgs_image image = planes_of(p);
+                if (kind < 3 || f % 3 == 0) /* without parts, which here are the CPU's */
+                    image.diffuse = image.specular = image.scattering = image.normal = image.depth =
+                        image.shadow = NULL;
+                if (other) lights[0] = point_light(-2, -3, 1), lights[1] = point_light(1, -4, 2);
+                if (kind == 0 && f == 2) memset(lights[0].intensity, 0, sizeof lights[0].intensity);
+                if (kind == 1 && f == 2) options.terms &= ~SSDGS_SHADOW_TERM;
+                if ((kind == 2 && f == 2) || (kind == 3 && f == 1)) options.terms &= ~SSDGS_SCATTERING_TERM;
+                CHECK(!ssdgs_scene_render(scenes[other], &object, 1, &camera, lights, 2, &options, &image,
+                                          NULL));
+            }
+            for (int m = 0; m < 2; m++) ssdgs_model_destroy(models[m]), ssdgs_scene_destroy(scenes[m]);
+        }
+        ssdgs_context_destroy(context);
+    }
+    context = own;
+    for (int kind = 0; kind < KINDS; kind++)
+        for (int f = 0; f < TURNS; f++) {
+            const double db = decibels(pictures[1][kind][f].value, pictures[0][kind][f].value, 3 * PIXELS);
+            if (!CHECK(db > 60)) printf("    kind %d, turn %d: %.1f dB\n", kind, f, db);
+        }
+}
+
+/* What is not finite, in each channel of each kind of model, as the CPU has it; and a frame with too many
+   splats for the device harms no other. */
+static void odd_models(void) {
+    static picture pictures[2];
+    ssdgs_context *const own = context;
+    ssdgs_context *contexts[2];
+    ssdgs_context_desc desc;
+    const int32_t most = device->most;
+    memset(&desc, 0, sizeof desc);
+    const ssdgs_gpu_hook hook = gpu_hook(device);
+    const ssdgs_light light = point_light(2, 3, 4);
+    ssdgs_render_options options = ssdgs_render_options_exact();
+    for (int i = 0; i < 2; i++) {
+        desc.gpu = i ? &hook : NULL;
+        if (!CHECK(!ssdgs_context_create(&desc, contexts + i))) exit(1);
+    }
+    for (int kind = 0; kind < MODELS; kind++)
+        for (int value = 0; value < 2; value++) {
+            ssdgs_scene *scenes[2];
+            ssdgs_model *models[2];
+            for (int i = 0; i < 2; i++) {
+                context = contexts[i];
+                models[i] = model_of(kind);
+                const ssdgs_model_view v = ssdgs_model_arrays(models[i]);
+                for (int c = 0; c < v.channels;
+                     c++) /* networks make of infinite codes what their sums' order does */
+                    if (!value || c < SSDGS_MATERIAL || c >= SSDGS_CHANNELS || kind == 3)
+                        v.gaussians[(size_t)c * v.stride + (size_t)(2 * c)] = (float)(value ? INFINITY : NAN);
+                ssdgs_object object = ssdgs_object_default(models[i]);
+                object.presence = (ssdgs_real)(value ? 1 : 0.9);
+                const ssdgs_camera camera = camera_from(2, 0.3, 1);
+                ssdgs_image image;
+                memset(&image, 0, sizeof image);
+                image.color = pictures[i].value, image.alpha = pictures[i].value + 15 * PIXELS;
+                CHECK(!ssdgs_scene_create(context, scenes + i));
+                CHECK(!ssdgs_scene_render(scenes[i], &object, 1, &camera, &light, 1, &options, &image,
+                                          &pictures[i].stats));
+            }
+            const double db =
+                fmin(decibels(pictures[1].value, pictures[0].value, 3 * PIXELS),
+                     decibels(pictures[1].value + 15 * PIXELS, pictures[0].value + 15 * PIXELS, PIXELS));
+            if (!CHECK(db > 60)) printf("    kind %d, value %d: %.1f dB\n", kind, value, db);
+            CHECK(pictures[1].stats.blackened == pictures[0].stats.blackened);
+            for (int i = 0; i < 2; i++) ssdgs_scene_destroy(scenes[i]), ssdgs_model_destroy(models[i]);
+        }
+    context = contexts[1];
+    const ssdgs_settings s = small_settings();
+    ssdgs_model *small = cloud(&s, 0, 100, 0.4), *large = cloud(&s, 0, 1200, 6);
+    const ssdgs_model_view v = ssdgs_model_arrays(large);
+    for (size_t c = 0; c < 3; c++)
+        for (size_t i = 0; i < 1200; i++) v.gaussians[(SSDGS_LOG_SCALE + c) * v.stride + i] += 2;
+    device->most = 4 << 20;
+    device->instance_room = 100;
+    for (int f = 0; f < 3; f++) {
+        ssdgs_camera camera = camera_from(2, 0.3, 1);
+        static ssdgs_real color[3 * 400 * 400];
+        ssdgs_image image;
+        memset(&image, 0, sizeof image);
+        image.color = color;
+        if (f == 1)
+            camera.width = camera.height = 400, camera.fx = camera.fy = 300, camera.cx = camera.cy = 200;
+        const ssdgs_result result =
+            ssdgs_render_ex(f == 1 ? large : small, &camera, &light, 1, &options, &image, NULL);
+        CHECK(f == 1 ? result == SSDGS_ERR_LIMIT : !result && gpu_last_picture(device).buffer);
+    }
+    device->most = most;
+    ssdgs_model_destroy(small), ssdgs_model_destroy(large);
+    for (int i = 0; i < 2; i++) ssdgs_context_destroy(contexts[i]);
+    context = own;
+}
+
 /* With another transport_detail, from where other Gaussians are seen, what is kept of transport is to the bit
    what a device has that has drawn nothing before. */
 static void kept_transport(void) {
@@ -1665,6 +1789,8 @@ int main(void) {
         dispatches();
         kept();
         changes(400);
+        in_turn();
+        odd_models();
         kept_transport();
         failures();
         for (int which = 0; which < 3; which++) {

@@ -1301,6 +1301,28 @@ static void test_shadow_maps(void) {
     const ssdgs_real both[6] = {0, 0, 0, (ssdgs_real)-0.25, 0, 0};
     ssdgs__let_pass(&frame, 0, both, 2, passed);
     CHECK(passed[0] >= 1 && passed[1] <= 0);
+    for (l.convention = 0; l.convention < CONVENTIONS;
+         l.convention += REVERSED) { /* one that ends before it */
+        if (l.convention & (ENDLESS | RADIAL)) continue;
+        const double far_off_eye[3] = {20 * l.eye[0], 20 * l.eye[1], 20 * l.eye[2]};
+        looking shallow = l;
+        memcpy(shallow.eye, far_off_eye, sizeof shallow.eye);
+        shallow.wide = 9;
+        make_shadow_map(&shallow, maps, other_depth);
+        maps->light = maps[1].light = (l.convention & PARALLEL) != 0;
+        l.wide = 1.1;
+        make_shadow_map(&l, maps + 1, depth);
+        maps[1].light = maps->light;
+        for (int i = 0; i < MAP * MAP; i++) other_depth[i] = l.convention & REVERSED ? 0 : 1;
+        ssdgs__let_pass(&frame, maps->light, below, 3, passed);
+        CHECK(passed[2] <= 0);
+    }
+    l.convention = 0;
+    occluder.map_count = 1; /* nearer to the light than the bias nothing is dark */
+    make_shadow_map(&l, maps, depth);
+    maps->bias = 3;
+    ssdgs__let_pass(&frame, 0, below, 3, passed);
+    CHECK(passed[0] >= 1 && passed[1] >= 1 && passed[2] >= 1);
 }
 
 /* Exactly what the plate takes. */
@@ -1341,7 +1363,10 @@ static void test_shadow_map_frames(void) {
         darker += fabs((double)(shot[1].value[i] - shot[0].value[i])), norm += fabs((double)shot[0].value[i]);
     CHECK(darker > 0.05 * norm);
     CHECK_L2(shot[2].value, shot[1].value, 3 * PIXELS, 0.05, "a shadow map for a callback");
+    static float copied[MAP * MAP];
+    memcpy(copied, depth, sizeof copied);
     for (int change = 0; change < 6; change++) {
+        map.depth = change % 2 ? copied : depth; /* the same elsewhere */
         if (change == 1) map.revision++;
         if (change == 2) map.bias *= 2;
         if (change == 3) map.matrix[3] *= (ssdgs_real)1.001;
@@ -1353,7 +1378,7 @@ static void test_shadow_map_frames(void) {
     }
     CHECK(same(shot, shot + 2));
     make_shadow_map(&from, &map, depth);
-    for (int wrong = 0; wrong < 10; wrong++) {
+    for (int wrong = 0; wrong < 12; wrong++) {
         ssdgs_shadow_map bad = map;
         ssdgs_image image;
         memset(&image, 0, sizeof image);
@@ -1366,6 +1391,8 @@ static void test_shadow_map_frames(void) {
         if (wrong == 5) bad.bias = -1;
         if (wrong == 6) bad.range = (ssdgs_real)INFINITY;
         if (wrong == 7) bad.matrix[15] = (ssdgs_real)NAN;
+        if (wrong == 10) bad.pitch = 0;
+        if (wrong == 11) bad.pitch = 4 - bad.pitch;
         ssdgs_scene_occlude(scene, &occluder);
         CHECK(ssdgs_scene_render(scene, &object, 1, &camera, lights, 2, NULL, &image, NULL) ==
               (wrong == 7 ? SSDGS_ERR_NONFINITE : SSDGS_ERR_ARGUMENT));

@@ -1367,11 +1367,11 @@ static void test_one_light(void) {
         const int known = trainer->one_light;
         for (int k = 0; k < 2; k++) {
             double moves[SSDGS__CORRECTIONS];
-            ssdgs__drawn drawn;
+            double drawn[3];
             ssdgs_frame frame;
             trainer->one_light = k ? known : 0;
             CHECK(!ssdgs__sky_shares(model, trainer->stride, trainer->sky_share));
-            CHECK(!ssdgs__draw_photo(trainer, &step, 0, 1, &frame, moves, &drawn));
+            CHECK(!ssdgs__draw_photo(trainer, &step, 0, 1, &frame, moves, drawn));
             for (int c = 0; c < SSDGS_CHANNELS; c++)
                 for (int i = 0; i < MANY; i++)
                     gradient[k][c * MANY + i] =

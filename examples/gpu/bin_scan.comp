@@ -6,6 +6,7 @@
 #include "scan.glsl"
 
 layout(std430, binding = 6) buffer groups_ { uint before[]; };
+shared uint starts[256]; /* of each slot */
 uint in_256s(uint x) { return (x >> 8u) + 1u; } /* sums of these fit 32 bits where sums of x may not */
 void main() {
     if (group() > 0u) return;
@@ -18,17 +19,13 @@ void main() {
     for (uint i = first; i < end; i++) {
         uint own = before[i];
         before[i] = at;
-        if (i % groups == 0u) facts[view_at_work[i / groups]].instances = at;
+        if (i % groups == 0u) starts[i / groups] = at;
         at += own;
     }
-    memoryBarrierBuffer();
     barrier();
-    if (lane() == 0u) {
-        facts[total].instances = all;
-        for (uint slot = 0u; slot < slots; slot++) {
-            uint next = slot + 1u < slots ? facts[view_at_work[slot + 1u]].instances : all;
-            uint view = view_at_work[slot];
-            facts[view].instances = all == none ? none : next - facts[view].instances;
-        }
+    for (uint slot = lane(); slot < slots; slot += 256u) {
+        uint next = slot + 1u < slots ? starts[slot + 1u] : all;
+        facts[view_at_work[slot]].instances = all == none ? none : next - starts[slot];
     }
+    if (lane() == 0u) facts[total].instances = all;
 }

@@ -1250,6 +1250,7 @@ static void gpu_upload_outside(gpu *g, const ssdgs_frame *frame) {
         gpu_set_shadow_map(g, i, maps + i, all);
         all += (size_t)maps[i].width * (size_t)maps[i].height;
         key = gpu_fold(key, maps + i, sizeof *maps);
+        key = gpu_fold(key, g->shadow_texture + i, sizeof *g->shadow_texture);
     }
     const int hides = frame->scene_depth || g->scene_texture.name;
     const size_t size = (all + (hides ? pixels : 4)) * value;
@@ -1392,7 +1393,8 @@ static void gpu_transport(gpu *g, const ssdgs_frame *frame) {
                                       &f->transport,     &f->arrived, NULL};
     gpu_run(g, GPU_TRANSPORT_NODES, &g->p, nodes, (size_t)g->p.lights * g->p.above);
     gpu_run(g, GPU_TRANSPORT_SUMS, &g->p, sums, (size_t)g->p.lights * g->p.blocks);
-    for (int i = 0; i < frame->light_count; i++) f->light[i].ready = !g->result;
+    for (int i = 0; i < frame->light_count; i++) /* of others there are no nodes */
+        f->light[i].ready = !g->result && gpu_casts(frame->lights + i);
 }
 
 /* The Gaussians seen: a list of them, and their colours and layers. */
@@ -1685,11 +1687,10 @@ static int gpu_had_room(gpu *g, ssdgs_frame *frame) {
         v->instances = facts[i].instances;
         v->nearest = (ssdgs_real)facts[i].nearest;
     }
-    if (most > UINT32_MAX / 2)
-        gpu_fail(g, SSDGS_ERR_LIMIT, "too many splats for the image or the lights' maps");
-    if (g->result || most <= g->instance_room) return 1;
     const size_t fits = (size_t)g->most / 16; /* of 16 bytes, at most */
-    g->instance_room = most + most / 4 > fits && most <= fits ? fits : most + most / 4;
+    if (most > fits) gpu_fail(g, SSDGS_ERR_LIMIT, "too many splats for the image or the lights' maps");
+    if (g->result || most <= g->instance_room) return 1;
+    g->instance_room = most + most / 4 > fits ? fits : most + most / 4;
     return 0;
 }
 

@@ -14,11 +14,11 @@ void load_front(uint place, uint gaussian) {
     vec2 own = hides + median > 0u ? slope[gaussian] : vec2(0);
     fronts[place] = vec3(own, depth[base + gaussian]);
 }
-/* An entry's mean depth at a pixel. */
+/* An entry's mean depth at a pixel, above 0. */
 float depth_at(uint i, vec2 at) {
     uint some = i % window;
     vec2 d = at - splats[some].xy;
-    return fronts[some].z + fronts[some].x * (splats[some].z * d.x + splats[some].w * d.y) +
-        fronts[some].y * (spreads[some].x * d.y);
+    vec2 uw = vec2(splats[some].z * d.x + splats[some].w * d.y, spreads[some].x * d.y);
+    return max(0.001 * fronts[some].z, fronts[some].z + dot(fronts[some].xy, uw));
 }
 bool is_open(uint i) { return hides == 0u || depth_at(i, centre()) < behind; }

@@ -11,8 +11,11 @@ float passes_map(uint which, vec3 place, vec3 away, float distance) {
     vec2 size = vec2(m.size.xy), p = (1 + vec2(1, m.kind.w) * at.xy / at.w) / 2 * size - 0.5;
     if (!(at.w > 0 && p.x >= -0.5 && p.x <= size.x - 0.5 && p.y >= -0.5 && p.y <= size.y - 0.5)) return -1;
     bool reversed = !(m.kind.y > 0) && by.z * at.w < at.z * by.w;
-    float z = (at.z - m.kind.x * by.z) / (at.w - m.kind.x * by.w);
-    float d = clamp(m.kind.y > 0 ? (distance - m.kind.x) / m.kind.y : m.kind.z > 0 ? z : (1 + z) / 2, 0, 1);
+    float w_there = at.w - m.kind.x * by.w, z = (at.z - m.kind.x * by.z) / w_there;
+    float d = m.kind.y > 0 ? (distance - m.kind.x) / m.kind.y : m.kind.z > 0 ? z : (1 + z) / 2;
+    bool beyond = reversed ? d < 0 : d > 1;
+    if (!(m.kind.y > 0) && !(w_there > 0)) return 1; /* nearer to the light than the bias */
+    d = clamp(d, 0, 1);
     p = max(p, vec2(0));
     ivec2 first = ivec2(p);
     vec2 part = p - vec2(first);
@@ -23,7 +26,7 @@ float passes_map(uint which, vec3 place, vec3 away, float distance) {
         bool hidden = is_number(there) && (reversed ? there > d : there < d);
         passed += hidden ? 0 : ((i & 1) != 0 ? part.x : 1 - part.x) * (i > 1 ? part.y : 1 - part.y);
     }
-    return passed;
+    return beyond && passed > 0.999999 ? -1 : passed;
 }
 float let_pass(int light, vec3 place) {
     bool directional = lamps[light].place.w > 0;

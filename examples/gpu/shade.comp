@@ -21,6 +21,7 @@ vec3 wo;
 float irradiance;
 float cosine;
 float gloss;
+bool black; /* something is not finite, or too large */
 float blunter = 0.0; /* what the object's roughness takes from a deferred lobe's logarithms */
 /* What a baked model has besides its colours is neutral. */
 float raw(int channel) {
@@ -32,7 +33,8 @@ vec3 raw3(int channel) { return vec3(raw(channel), raw(channel + 1), raw(channel
 /* NaN, which max() and clamp() may lose. */
 bool is_broken() {
     bool any = false;
-    for (int i = diffuse; i < material; i++) any = any || !is_number(raw(i));
+    for (int i = diffuse; i < (on(is_deferred) ? asg_weight + 4 : material); i++)
+        any = any || !is_number(raw(i));
     return any;
 }
 void find_frame() {
@@ -147,7 +149,6 @@ void encode_scattering(float cue, float arrives[lengths]) {
 
 layout(std430, binding = 11) writeonly buffer layer_block { vec4 layer[]; }; /* the first is the colour */
 bool live; /* the thread has a Gaussian of its own */
-bool black; /* something is not finite, or too large */
 void write_layer(int which, vec3 value) {
     black = black || !is_finite(value) || any(greaterThan(abs(value), vec3(1e30)));
     if (live) layer[uint(which) * count + me] = vec4(value, 0);
@@ -230,6 +231,7 @@ vec3 find_kept() {
     for (uint c = 0u; c < 3u; c++) {
         float sum = 0.28209479177387814 * plane_of(o, first + c, own) + 0.5;
         for (uint i = 0u; i < more; i++) sum += y[i] * plane_of(o, first + 3u + c * more + i, own);
+        black = black || !is_number(sum);
         sum = is_number(sum) ? max(0.0, sum) : 0.0;
         kept[c] = (on(decodes) ? decoded(sum) : sum) * objects[o].shape.w;
     }
