@@ -183,6 +183,7 @@ CHANGES, for programs written for 0.2.4
   ssdgs_scene_light(.., lights)  the camera before the lights, or NULL
   ssdgs_to_pixels(image, ..)     ssdgs_to_pixels(context, image, ..), and ssdgs_blend_pixels() alike
   options.max_gaussians          what training ends with; before it may have options.surplus times as many
+  image.scene_depth              hides at each pixel by a Gaussian's mean depth there, not by its centre's
   raw planes of a baked model    14, and f_rest behind: ssdgs_model_view.channels; SSDGS_DIFFUSE is f_dc
 
 CONTENTS, search for the tag

@@ -235,13 +235,12 @@ enum {
     GPU_SLOPES = 14, /* and these two: slopes; shadow maps, the scene's depth */
     GPU_OUTSIDE = 15,
     GPU_BINDINGS = 16,
-    GPU_MOST_BLOCKS = 14, /* storage blocks of a program: SHADE's */
+    GPU_MOST_BLOCKS = 14, /* storage blocks of a program: COMPOSITE's */
     GPU_LAMPS = 64,
     GPU_VIEWS = 256,
     GPU_MAPS = 64,
     GPU_TOTALS = 256, /* batches of views */
     GPU_LENGTHS = 5,  /* of true dipole transport */
-    GPU_NODE = 64,    /* Gaussians where light enters, taken together */
     GPU_ROWS = 4096   /* values that a group's networks work on */
 };
 
@@ -289,7 +288,7 @@ typedef struct gpu_fact {
 /* What a frame leaves, as in ssdgs_frame. */
 typedef struct gpu_frame {
     gpu_set camera,
-        others; /* of the camera and of lights that move with it; of lights while the camera rests */
+        others; /* of the camera, and lights in the same frame; of lights while the camera rests */
     gpu_buffer tables, object_of, facts, slopes, outside, masks;
     gpu_arena models; /* planes, networks, sky shares; floats */
     gpu_arena maps;   /* tiles of light maps */
