@@ -655,9 +655,9 @@ SSDGS_API ssdgs_result ssdgs_scene_render(ssdgs_scene *scene, const ssdgs_object
                                           const ssdgs_image *image, ssdgs_render_stats *stats);
 
 /* A shadow map of an engine's meshes: depths seen from the light's position or, directional, along its
-   direction. Several of one light, cascades or a cube's faces, are asked in their order, finer ones first:
-   the first decides that has the place in its picture and not beyond its far end. Where none has, nothing is
-   hidden. Four pixels are compared. */
+   direction. Several of one light, cascades or a cube's faces, are asked in their order, finer ones first,
+   until one has the place in its picture and ahead of its far end. If none has, nothing is hidden. Four
+   pixels are compared. */
 typedef struct ssdgs_shadow_map {
     int light;             /* its number in the frame; one that is `unshadowed` ignores the map */
     int width, height;     /* px */
@@ -669,7 +669,7 @@ typedef struct ssdgs_shadow_map {
                          it is clip space's */
     const float *depth; /* (height,width) 0 .. 1, may be reversed; the clear value where nothing is. Top row
                            first: of OpenGL's textures point to the last row, and let pitch be negative. NaN
-                           hides nothing. NULL: only desc.gpu has them, what the CPU draws gets no shadow */
+                           hides nothing. NULL: only desc.gpu has them; frames drawn by the CPU lack them */
     ptrdiff_t pitch;    /* bytes from row to row */
 } ssdgs_shadow_map;
 /* What else takes light from the objects, meshes for instance. */
@@ -5432,7 +5432,7 @@ static void ssdgs__let_pass(const ssdgs_frame *frame, int light, const ssdgs_rea
     const ssdgs_light *from = frame->lights + light;
     for (int i = 0; i < count; i++) fraction[i] = 1;
     if (count && o->shadow) o->shadow(o->user, light, points, count, fraction);
-    for (int i = 0; i < count; i++, points += 3) {
+    for (int i = 0; i < count && o->map_count; i++, points += 3) {
         double away[3], distance = 0;
         for (int c = 0; c < 3; c++) {
             const double d = (double)points[c] - (double)from->position[c];

@@ -517,7 +517,8 @@ static const uint32_t gpu_targets[4][2] = {
 static void gpu_note_bound(gpu *g) {
     gpu_current *c = &g->callers;
     const gpu_gl *gl = &g->gl;
-    while (gl->GetError()) {} /* of the caller's calls */
+    /* errors of the caller's calls; a lost context has no end of them */
+    for (int i = 0; i < 8 && gl->GetError(); i++) {}
     gl->GetIntegerv(GPU_GL_CURRENT_PROGRAM, &c->program);
     for (int i = 0; i < 4; i++) gl->GetIntegerv(gpu_targets[i][1], c->buffers + i);
     for (uint32_t i = 0; i <= GPU_BINDINGS; i++) {
@@ -852,12 +853,14 @@ static void gpu_network_sizes(const ssdgs_settings *s, int shadow, int32_t sizes
     sizes[3] = shadow ? 1 : s->per_channel_optics ? 7 : 3;
 }
 
+static size_t gpu_fours(size_t count) { return (count + 3) / 4 * 4; }
+
 /* Floats of a network on the device, with its neurons padded to 4. */
 static size_t gpu_network_size(const int32_t sizes[4]) {
     size_t size = 0, depth = (size_t)sizes[1];
     for (int layer = 1; layer <= sizes[0]; layer++) {
         const size_t neurons = (size_t)sizes[layer < sizes[0] ? 2 : 3];
-        size += (depth + 1) * ((neurons + 3) / 4 * 4);
+        size += (depth + 1) * gpu_fours(neurons);
         depth = neurons;
     }
     return size;
@@ -868,7 +871,7 @@ static size_t gpu_network_size(const int32_t sizes[4]) {
 static void gpu_turn_network(const int32_t sizes[4], const ssdgs_real *weights, float *to) {
     size_t depth = (size_t)sizes[1];
     for (int layer = 1; layer <= sizes[0]; layer++) {
-        const size_t neurons = (size_t)sizes[layer < sizes[0] ? 2 : 3], stride = (neurons + 3) / 4 * 4;
+        const size_t neurons = (size_t)sizes[layer < sizes[0] ? 2 : 3], stride = gpu_fours(neurons);
         for (size_t i = 0; i < neurons; i++) {
             for (size_t k = 0; k < depth; k++) to[k * stride + i] = (float)weights[i * depth + k];
             to[depth * stride + i] = (float)weights[neurons * depth + i];
@@ -884,8 +887,6 @@ typedef struct gpu_model_layout {
     size_t stride, weights, shadow, sky, size; /* where each begins; size: of all */
     int32_t networks[2][4];
 } gpu_model_layout;
-
-static size_t gpu_fours(size_t count) { return (count + 3) / 4 * 4; }
 
 static gpu_model_layout gpu_layout(const ssdgs_placed *o) {
     gpu_model_layout l;
@@ -1236,6 +1237,20 @@ static uint64_t gpu_fold(uint64_t key, const void *data, size_t size) {
     return key;
 }
 
+/* Writes rows of so many bytes, which on the host are `pitch` apart. */
+static void gpu_write_rows(gpu *g, const gpu_buffer *b, size_t from, const void *rows, ptrdiff_t pitch,
+                           size_t row, int count) {
+    const size_t size = row * (size_t)count;
+    if (pitch == (ptrdiff_t)row) {
+        gpu_write(g, b, from, rows, size);
+        return;
+    }
+    char *const packed = (char *)gpu_host(g, size);
+    for (int y = 0; y < count && packed; y++)
+        memcpy(packed + row * (size_t)y, (const char *)rows + pitch * y, row);
+    gpu_write(g, b, from, packed, size);
+}
+
 /* In front the engine's shadow maps, which stay until one changes; behind them the scene's depth. */
 static void gpu_upload_outside(gpu *g, const ssdgs_frame *frame) {
     gpu_buffer *to = &g->frame.outside;
@@ -1259,14 +1274,10 @@ static void gpu_upload_outside(gpu *g, const ssdgs_frame *frame) {
     g->owner = owner; /* nothing that is kept */
     for (int i = 0; i < map_count && !g->result; i++) {
         const ssdgs_shadow_map *m = maps + i;
-        const size_t at = (size_t)g->tables->maps[i].size[2], row = (size_t)m->width * value;
-        if (g->shadow_texture[i].name) gpu_copy_texture(g, g->shadow_texture + i, to, at * value);
-        else if (key != g->outside && m->depth) {
-            char *const rows = (char *)gpu_host(g, row * (size_t)m->height);
-            for (int y = 0; y < m->height && rows; y++)
-                memcpy(rows + row * (size_t)y, (const char *)m->depth + m->pitch * y, row);
-            gpu_write(g, to, at * value, rows, row * (size_t)m->height);
-        }
+        const size_t at = (size_t)g->tables->maps[i].size[2] * value;
+        if (g->shadow_texture[i].name) gpu_copy_texture(g, g->shadow_texture + i, to, at);
+        else if (key != g->outside && m->depth)
+            gpu_write_rows(g, to, at, m->depth, m->pitch, (size_t)m->width * value, m->height);
     }
     g->outside = g->result ? 0 : key;
     g->p.map_count = (uint32_t)map_count;
@@ -1274,13 +1285,9 @@ static void gpu_upload_outside(gpu *g, const ssdgs_frame *frame) {
     g->p.scene_at = (uint32_t)all;
     g->p.scene_raw = g->scene_texture.name != 0;
     if (g->scene_texture.name) gpu_copy_texture(g, &g->scene_texture, to, all * value);
-    else if (frame->scene_depth) {
-        float *const rows = (float *)gpu_host(g, pixels * value);
-        for (int y = 0; y < frame->camera.height && rows; y++)
-            memcpy(rows + width * (size_t)y, frame->scene_depth + (size_t)frame->stride * (size_t)y,
-                   width * value);
-        gpu_write(g, to, all * value, rows, pixels * value);
-    }
+    else if (frame->scene_depth)
+        gpu_write_rows(g, to, all * value, frame->scene_depth, (ptrdiff_t)value * frame->stride,
+                       width * value, frame->camera.height);
 }
 
 /* 1 / depth of a value of OpenGL's depth buffer, by the pixel's column, its row from the top, and the value:
@@ -1437,8 +1444,10 @@ static void gpu_set_work(gpu *g, const ssdgs_frame *frame, const uint32_t *views
         t->view_at_work[slot] = (uint32_t)view;
         t->views[view].of[2] = (int32_t)p->tiles;
         p->tiles += (uint32_t)gpu_tiles(frame->views + view);
-        if (light < 0) p->camera_tiles = p->tiles;
-        if (light < 0) continue;
+        if (light < 0) {
+            p->camera_tiles = p->tiles;
+            continue;
+        }
         int32_t *last = p->works ? t->light_at_work[p->works - 1] : NULL;
         if (last && last[0] == light) {
             last[2] = slot + 1;
