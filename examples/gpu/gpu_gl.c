@@ -1399,8 +1399,8 @@ static void gpu_transport(gpu *g, const ssdgs_frame *frame) {
                                       &f->transport,     &f->arrived, NULL};
     gpu_run(g, GPU_TRANSPORT_NODES, &g->p, nodes, (size_t)g->p.lights * g->p.above);
     gpu_run(g, GPU_TRANSPORT_SUMS, &g->p, sums, (size_t)g->p.lights * g->p.blocks);
-    for (int i = 0; i < frame->light_count; i++) /* of others there are no nodes */
-        f->light[i].ready = !g->result && gpu_casts(frame->lights + i);
+    for (int i = 0; i < frame->light_count; i++)
+        f->light[i].ready = !g->result; /* dark ones are walked again */
 }
 
 /* The Gaussians seen: a list of them, and their colours and layers. */
