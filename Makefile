@@ -22,7 +22,7 @@ PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
 HEADERS = ssdgs.h $(wildcard examples/*.h) tests/test.h tests/scene.h tests/kernels.h
-EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/bench
+EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/colmap $(BUILD)/bench
 SOURCES = $(filter-out tests/t_gpu.c,$(wildcard tests/t_*.c)) # which is `make test-gpu`
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))
 TESTS = $(SOURCES:tests/%.c=$(BUILD)/%) $(IN_DOUBLE:tests/%.c=$(BUILD)/%_64) \
@@ -32,7 +32,7 @@ RUN =# starts a test program: an emulator
 DEMO = $(BUILD)/demo
 MODEL = examples/data/waxcow.ply
 
-all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/view, build/check, build/ball, build/unbake, build/bench
+all: $(EXAMPLES) ## the examples: build/train, build/relight, build/minimal, build/engine, build/export, build/view, build/check, build/ball, build/unbake, build/colmap, build/bench
 
 demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATIONS=5000), relights it into build/demo
 	@mkdir -p $(DEMO)
@@ -178,6 +178,7 @@ $(BUILD)/train_mpi: examples/train_mpi.c $(HEADERS) $(OBJECTS)
 $(BUILD)/%: tests/%.c $(HEADERS) $(OBJECTS)
 	$(PROGRAM) $(LINKED)
 $(BUILD)/t_ball: examples/ball.c
+$(BUILD)/t_colmap: examples/colmap.c
 $(BUILD)/train $(BUILD)/view: LDLIBS += $(if $(WINDOWS),-lws2_32)
 # What has the GPU's stages
 ON_GPU = $(addprefix $(BUILD)/,view engine bench t_gpu engine_gl)

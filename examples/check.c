@@ -26,8 +26,8 @@ typedef struct check {
     olat_dataset sets[2]; /* train, test */
     facts *found[2];
     ssdgs_train_options options;
-    double middle[3];
-    char *notes; /* what the trainer says, a line each */
+    double box[6], middle[3]; /* the box as given, or infinite */
+    char *notes;              /* what the trainer says, a line each */
     int problems;
 } check;
 
@@ -428,7 +428,8 @@ static int usage(void) {
             "usage: check DATASET [--out DIR] [--bounds X,Y,Z,X,Y,Z] [--train-json FILE]\n"
             "Says what is right and wrong with a capture; lines with an arrow ask for something.\n"
             "  --out DIR     draws into a folder: photographs.png (clipped: red, black: blue), places.svg\n"
-            "  --bounds ...  corners of the box that holds the object; -0.5,-0.5,-0.5,0.5,0.5,0.5\n"
+            "  --bounds ...  corners of the box that holds the object; the dataset's own, else\n"
+            "                -0.5,-0.5,-0.5,0.5,0.5,0.5\n"
             "  --train-json FILE  another list of frames in DATASET; transforms_train.json\n");
     return 2;
 }
@@ -466,8 +467,7 @@ static int run(check *k) {
         k->found[s] = (facts *)calloc((size_t)k->sets[s].count, sizeof **k->found);
         if (!k->found[s]) return fail("out of memory");
         for (int c = 0; c < 3 && !s; c++) {
-            k->options.bounds_min[c] -= (ssdgs_real)k->sets[0].origin[c];
-            k->options.bounds_max[c] -= (ssdgs_real)k->sets[0].origin[c];
+            olat_box_side(k->sets, c, k->box[c], k->box[3 + c], &k->options);
             k->middle[c] = (double)(k->options.bounds_min[c] + k->options.bounds_max[c]) / 2;
         }
         for (int i = 0; i < k->sets[s].count && !failed; i++) {
@@ -490,8 +490,8 @@ static int run(check *k) {
 
 int main(int argc, char **argv) {
     check k;
-    double box[6];
     memset(&k, 0, sizeof k);
+    for (int c = 0; c < 6; c++) k.box[c] = HUGE_VAL;
     k.options = ssdgs_train_options_default();
     k.train_json = "transforms_train.json";
     for (int i = 1; i < argc; i++) {
@@ -500,13 +500,12 @@ int main(int argc, char **argv) {
         else if (!strcmp(argv[i], "--bounds") && i + 1 < argc) {
             const char *at = argv[++i];
             for (int c = 0; c < 6; c++) {
-                const size_t used = olat__parse_number(at, box + c);
+                const size_t used = olat__parse_number(at, k.box + c);
                 if (!used || at[used] != (c < 5 ? ',' : 0)) return usage();
                 at += used + (c < 5);
-                (c < 3 ? k.options.bounds_min : k.options.bounds_max)[c % 3] = (ssdgs_real)box[c];
             }
             for (int c = 0; c < 3; c++)
-                if (!(box[c] < box[c + 3]))
+                if (!(k.box[c] < k.box[c + 3]))
                     return fail("--bounds: the first corner must be below the second"), 2;
         } else if (argv[i][0] != '-' && !k.dataset) k.dataset = argv[i];
         else return usage();

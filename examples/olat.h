@@ -8,8 +8,9 @@
    ssdgs_photo *photos = olat_photos(&set);  ... photos[0 .. set.count) ...  free(photos); olat_free(&set);
 
    KEYS  At the top or in a frame: camera_angle_x camera_angle_y, or camera_intrinsics [cx, cy, fx, fy], or
-   fl_x fl_y cx cy w h. A frame's key wins over the top's, one for a focal length over all such keys of the
-   top.
+   fl_x fl_y cx cy w h; k1 .. k4, p1, p2 and camera_model of a lens that bends straight lines, which become
+   straight, see lens.h. A frame's key wins over the top's, one for a focal length over all such keys of the
+   top. At the top bounds_min and bounds_max, corners of the box that holds the object.
 
    In frames[]: file_path (+ file_ext) or img_path. mask_path, see MASKS. transform_matrix (camera to world,
    OpenGL axes), or R_opt and T_opt. pl_pos or pl_dir. pl_intensity. pl_mu and pl_axis: an LED, which
@@ -17,7 +18,7 @@
    pl_ keys.
 
    Or a frame is a camera's, with lists: light_positions, light_intensities, file_paths, less those that
-   exclude_list.txt names. Distorted lenses are refused.
+   exclude_list.txt names.
 
    IMAGES  PNG and OpenEXR as images.h reads them. A name without an ending is .png, or .exr where there is no
    such PNG.
@@ -49,12 +50,15 @@
 #include "files.h"
 #include "images.h"
 #include "json.h"
+#include "lens.h"
 #include <math.h>
 
 enum {                     /* flags of olat_load */
        OLAT_NO_IMAGES = 1, /* a trajectory: images are neither needed nor read; sizes are w, h or 256 x 256 */
        OLAT_ALLOW_PARENT = 2 /* image paths may contain ".." */
 };
+/* Another one: photographs, masks and cameras are made so many times smaller, 1 to 1024. */
+#define OLAT_DOWNSCALE(times) ((times) << 8)
 
 enum { OLAT_MOST_LIGHTS = 64 }; /* of a photograph */
 
@@ -67,6 +71,7 @@ typedef struct olat_frame {
     void *pixels;      /* (h,w,4) straight alpha, tightly packed; NULL without image */
     ssdgs_pixels format;
     int has_image;
+    olat_lens lens; /* of the photograph as its file has it */
 } olat_frame;
 
 typedef struct olat_dataset {
@@ -74,6 +79,8 @@ typedef struct olat_dataset {
     int count;
     double origin[3]; /* what positions are relative to, in the dataset's coordinates; 0 unless these lie far
                          away */
+    double bounds[2][3]; /* corners of the box that holds the object, in the dataset's coordinates */
+    int has_bounds;
     char notes[2048]; /* what was done or may be wrong: lines, the last one without its newline; "" if
                          nothing */
 } olat_dataset;
@@ -147,66 +154,78 @@ static int olat__get_pose(olat__json *j, const olat__node *object, const char *k
 typedef struct olat__lens {
     double focal[4], centre[2]; /* focal lengths of x and y, then angles of view; 0 = not given */
     int w, h, has_centre;
+    olat_lens bend; /* its k, p, fisheye */
 } olat__lens;
 
-/* Refuses a lens that is no pinhole's by its model's name, and by any coefficient that is not 0. */
-static void olat__check_lens(olat__json *j, const olat__node *object) {
-    static const char *const models[] = {"pinhole",     "simple_pinhole", "perspective", "opencv",
-                                         "full_opencv", "simple_radial",  "radial"};
-    static const char *const keys[] = {"camera_model",
-                                       "is_fisheye",
-                                       "k1",
-                                       "k2",
-                                       "k3",
-                                       "k4",
-                                       "k5",
-                                       "k6",
-                                       "k7",
-                                       "k8",
-                                       "k9",
-                                       "p1",
-                                       "p2",
-                                       "p3",
-                                       "p4",
-                                       "p5",
-                                       "p6",
-                                       "p7",
-                                       "p8",
-                                       "p9",
-                                       "s1",
-                                       "s2",
-                                       "s3",
-                                       "s4",
-                                       "s5",
-                                       "s6",
-                                       "s7",
-                                       "s8",
-                                       "s9",
-                                       "b1",
-                                       "b2",
-                                       "skew",
-                                       "ftheta_p0",
-                                       "ftheta_p1",
-                                       "ftheta_p2",
-                                       "ftheta_p3",
-                                       "ftheta_p4",
-                                       "distortion",
-                                       "distortion_params",
-                                       "distortion_coefficients",
-                                       "rolling_shutter"};
-    for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
-        const olat__node *node = olat__find(j, object, keys[i]);
-        int fine = !node || !olat__nonzero(j, node);
-        for (size_t m = 0;
-             !fine && i == 0 && node->type == OLAT__STRING && m < sizeof models / sizeof *models; m++)
-            fine = olat__is_word(node, models[m]);
-        if (fine) continue;
-        const char *value = node->type == OLAT__STRING ? node->text : node->type == OLAT__TRUE ? "true" : "";
-        olat__json_fail(j, node,
-                        "%.40s%sdistorted lenses are not supported: undistort the images first, with COLMAP's"
-                        " image_undistorter or Metashape's Export > Undistort, say",
-                        value, value[0] ? ": " : "");
+/* Reads how the lens bends, and refuses models that are not known by any coefficient that is not 0. */
+static void olat__read_bend(olat__json *j, const olat__node *object, olat_lens *bend) {
+    enum { FISHEYES = 7, MODELS = 11 };
+    static const char *const models[MODELS] = {
+        "pinhole",        "simple_pinhole",        "perspective",   "opencv",
+        "full_opencv",    "simple_radial",         "radial",        "fisheye",
+        "opencv_fisheye", "simple_radial_fisheye", "radial_fisheye"};
+    static const char *const known[7] = {"k1", "k2", "k3", "k4", "p1", "p2", "is_fisheye"};
+    static const char *const others[] = {"k5",
+                                         "k6",
+                                         "k7",
+                                         "k8",
+                                         "k9",
+                                         "p3",
+                                         "p4",
+                                         "p5",
+                                         "p6",
+                                         "p7",
+                                         "p8",
+                                         "p9",
+                                         "s1",
+                                         "s2",
+                                         "s3",
+                                         "s4",
+                                         "s5",
+                                         "s6",
+                                         "s7",
+                                         "s8",
+                                         "s9",
+                                         "b1",
+                                         "b2",
+                                         "skew",
+                                         "ftheta_p0",
+                                         "ftheta_p1",
+                                         "ftheta_p2",
+                                         "ftheta_p3",
+                                         "ftheta_p4",
+                                         "distortion",
+                                         "distortion_params",
+                                         "distortion_coefficients",
+                                         "rolling_shutter"};
+    const olat__node *model = olat__find(j, object, "camera_model"), *wrong = NULL;
+    for (int i = 0; i < 6; i++) {
+        const olat__node *node = olat__find(j, object, known[i]);
+        if (node && olat__nonzero(j, node))
+            olat__numbers(j, node, 1, i < 4 ? bend->k + i : bend->p + (i - 4));
     }
+    const olat__node *fisheye = olat__find(j, object, known[6]);
+    if (fisheye) bend->fisheye = olat__nonzero(j, fisheye);
+    if (model && olat__nonzero(j, model)) {
+        int m = 0;
+        while (m < MODELS && !(model->type == OLAT__STRING && olat__is_word(model, models[m]))) m++;
+        if (m == MODELS) wrong = model;
+        else bend->fisheye = m >= FISHEYES;
+    }
+    for (size_t i = 0; i < sizeof others / sizeof *others && !wrong; i++) {
+        const olat__node *node = olat__find(j, object, others[i]);
+        if (node && olat__nonzero(j, node)) wrong = node;
+    }
+    const int beyond = bend->fisheye ? fabs(bend->p[0]) > 0 || fabs(bend->p[1]) > 0 : fabs(bend->k[3]) > 0;
+    const olat__node *key = olat__find(j, object, bend->fisheye ? fabs(bend->p[0]) > 0 ? "p1" : "p2" : "k4");
+    if (beyond && !wrong) wrong = key ? key : object;
+    if (!wrong) return;
+    const char *value = wrong->type == OLAT__STRING ? wrong->text : wrong->type == OLAT__TRUE ? "true" : "";
+    olat__json_fail(
+        j, wrong,
+        "%.40s%sthis lens is not supported: OpenCV's k1, k2, k3, p1, p2 are, and its fisheye's k1 .. "
+        "k4. Undistort the images first, with COLMAP's image_undistorter, say",
+        value, value[0] ? ": " : "");
 }
 
 /* Reads what the object says about the lens over what is there already. */
@@ -214,7 +233,7 @@ static void olat__read_lens(olat__json *j, const olat__node *object, olat__lens 
     static const char *const focal[4] = {"fl_x", "fl_y", "camera_angle_x", "camera_angle_y"};
     double v[4] = {0, 0, 0, 0};
     int given = 0;
-    olat__check_lens(j, object);
+    olat__read_bend(j, object, &lens->bend);
     for (int i = 0; i < 2; i++) {
         const char *key = i ? "h" : "w";
         double side;
@@ -316,28 +335,48 @@ static void olat__find_origin(olat__json *j, const olat__node *frames, double or
     j->failed = 0;
 }
 
-/* Fills the camera, whose size is known, from the lens and the frame's pose. */
-static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens,
-                              const double origin[3], ssdgs_camera *camera) {
-    const double w = camera->width, h = camera->height;
-    int in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
-    if (in_pixels ? (lens->w && lens->w != camera->width) || (lens->h && lens->h != camera->height)
-                  : lens->w && lens->h &&
-                        fabs(w * lens->h - h * lens->w) >
-                            (w > h ? w : h)) { /* an angle allows another size alone */
-        olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", camera->width, camera->height);
-    }
+/* The lens of a photograph of so many pixels; 0 unless the two belong together. */
+static int olat__lens_of(const olat__lens *lens, int width, int height, olat_lens *out) {
+    const double size[2] = {(double)width, (double)height};
     double focal[2];
     for (int i = 0; i < 2; i++) {
         const double angle = lens->focal[2 + i];
-        focal[i] = lens->focal[i] > 0 ? lens->focal[i] : angle > 0 ? 0.5 * (i ? h : w) / tan(0.5 * angle) : 0;
+        focal[i] = lens->focal[i] > 0 ? lens->focal[i] : angle > 0 ? 0.5 * size[i] / tan(0.5 * angle) : 0;
     }
-    if (!(focal[0] + focal[1] > 0))
+    *out = lens->bend;
+    out->width = width;
+    out->height = height;
+    for (int i = 0; i < 2; i++) { /* pixels are square where one is not given */
+        out->focal[i] = focal[i] > 0 ? focal[i] : focal[!i];
+        out->centre[i] = lens->has_centre ? lens->centre[i] : 0.5 * size[i];
+    }
+    const int in_pixels = lens->focal[0] > 0 || lens->focal[1] > 0 || lens->has_centre;
+    return in_pixels ? (!lens->w || lens->w == width) && (!lens->h || lens->h == height)
+                     : !lens->w || !lens->h || /* an angle allows another size alone */
+                           fabs(size[0] * lens->h - size[1] * lens->w) <= fmax(size[0], size[1]);
+}
+
+/* Fills the frame's camera from its lens and its pose. */
+static void olat__read_camera(olat__json *j, const olat__node *node, const olat__lens *lens,
+                              const double origin[3], int downscale, olat_frame *frame) {
+    ssdgs_camera *camera = &frame->camera;
+    olat_lens *of = &frame->lens;
+    const int width = of->width, height = of->height, fits = olat__lens_of(lens, width, height, of);
+    if (!fits) olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", width, height);
+    else if (!(of->focal[0] > 0))
         olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
-    camera->fx = (ssdgs_real)(focal[0] > 0 ? focal[0] : focal[1]); /* else pixels are square */
-    camera->fy = (ssdgs_real)(focal[1] > 0 ? focal[1] : focal[0]);
-    camera->cx = (ssdgs_real)(lens->has_centre ? lens->centre[0] : 0.5 * w);
-    camera->cy = (ssdgs_real)(lens->has_centre ? lens->centre[1] : 0.5 * h);
+    else if (!olat_lens_zoom(of))
+        olat__json_fail(j, node, "the lens's k1 .. p2 leave no picture: are they of this camera?");
+    else if (width < downscale || height < downscale)
+        olat__json_fail(j, node, "%d x %d pixels are too few to be made %d times smaller", width, height,
+                        downscale);
+    if (j->failed) return;
+    camera->width = width / downscale;
+    camera->height = height / downscale;
+    camera->fx = (ssdgs_real)(of->zoom * of->focal[0] / downscale);
+    camera->fy = (ssdgs_real)(of->zoom * of->focal[1] / downscale);
+    camera->cx = (ssdgs_real)(of->centre[0] / downscale);
+    camera->cy = (ssdgs_real)(of->centre[1] / downscale);
     double view[12];
     olat__read_pose(j, node, origin, view);
     for (int i = 0; i < 12; i++) camera->view[i] = (ssdgs_real)view[i];
@@ -609,10 +648,12 @@ static int olat__side(double middle) {
 
 /* Photographs being read, on any threads. */
 typedef struct olat__reading {
-    olat_frame *frames; /* those at hand */
-    olat__found *found; /* what was found in each */
-    char *waits;        /* of all: its mask waits until all have been seen */
-    double white;       /* then what keeps all, of 1; before 0 */
+    olat_frame *frames;       /* those at hand */
+    const olat__lens *lenses; /* what the list says of them */
+    olat__found *found;       /* what was found in each */
+    char *waits;              /* of all: its mask waits until all have been seen */
+    double white;             /* then what keeps all, of 1; before 0 */
+    int downscale;
 } olat__reading;
 
 /* What all photographs have in common. */
@@ -649,17 +690,36 @@ static void olat__see(olat__seen *seen, const olat__found *found, int frame) {
     if (found->number > seen->number) seen->number = found->number;
 }
 
+/* The photograph, which has its mask, as it is used: without the lens's bending, and smaller. What is wrong
+   with the lens is told when the camera is read. */
+static int olat__reshape(const olat__reading *r, int i, olat__found *found, char *error) {
+    olat_frame *frame = r->frames + i;
+    olat_lens *lens = &frame->lens;
+    const int fits = olat__lens_of(r->lenses + i, frame->camera.width, frame->camera.height, lens),
+              bends = olat_lens_bends(lens);
+    if (!fits || !(lens->focal[0] > 0) || !olat_lens_zoom(lens) || lens->width < r->downscale ||
+        lens->height < r->downscale || (!bends && r->downscale == 1))
+        return 0;
+    void *reshaped = olat_resample(frame->pixels, frame->format, lens, r->downscale);
+    if (!reshaped) return olat__fail(error, "%s: out of memory", olat__tail(frame->file));
+    free(frame->pixels);
+    frame->pixels = reshaped;
+    if (bends) olat__tell(found, 0, "made straight where its lens bends lines");
+    return 0;
+}
+
 /* The frame's photograph as training takes it, or only its mask, which has waited. */
 static int olat__read_one(const olat__reading *r, int i, char *error) {
     olat_frame *frame = r->frames + i;
     olat__found *found = r->found + i;
     ssdgs_camera *camera = &frame->camera;
     memset(found, 0, sizeof *found);
-    if (r->white > 0) return olat__apply_mask(frame, r->white, found, error);
+    if (!(r->white > 0) && olat__image_file(frame->file, 0, &camera->width, &camera->height, &frame->format,
+                                            &frame->pixels, found, error))
+        return 1;
     frame->has_image = 1;
-    return olat__image_file(frame->file, 0, &camera->width, &camera->height, &frame->format, &frame->pixels,
-                            found, error) ||
-           (frame->mask && olat__apply_mask(frame, 0, found, error));
+    if (frame->mask && olat__apply_mask(frame, r->white, found, error)) return 1;
+    return !found->waits && olat__reshape(r, i, found, error);
 }
 
 static void olat__read_task(void *data, int i) {
@@ -672,10 +732,12 @@ static void olat__read_task(void *data, int i) {
 static void olat__read_all(olat__json *j, const olat_reader *reader, olat_dataset *out, olat__reading *r,
                            olat__seen *seen) {
     const int most = reader ? 16 + 4 * ssdgs_context_threads(reader->context) : 1; /* at a time */
+    const olat__lens *const lenses = r->lenses;
     char *const waits = r->waits;
     for (int begin = 0; begin < out->count && !j->failed; begin += most) {
         const int count = begin + most < out->count ? most : out->count - begin;
         r->frames = out->frames + begin;
+        r->lenses = lenses + begin;
         r->waits = waits + begin;
         if (reader && ssdgs_context_run(reader->context, count, olat__read_task, r))
             j->failed = olat__fail(j->error, "%s", ssdgs_error_message(reader->context));
@@ -691,6 +753,7 @@ static void olat__read_all(olat__json *j, const olat_reader *reader, olat_datase
         if (reader && reader->progress && !j->failed && !(r->white > 0))
             reader->progress(reader->user, begin + count, out->count);
     }
+    r->lenses = lenses;
     r->waits = waits;
 }
 
@@ -712,12 +775,15 @@ static void olat__note_tally(olat_dataset *out, const olat__tally *tally, int ma
 /* Reads all photographs and notes what is to be noted of them. A mask without anything bright is right where
    others are brighter; where none is, all are scaled alike: so a dim one among soft masks stays dim. What has
    less than 16 numbers is no brightness: they are labels. */
-static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dataset *out) {
+static void olat__read_photos(olat__json *j, const olat__lens *lenses, int downscale,
+                              const olat_reader *reader, olat_dataset *out) {
     const int most = reader ? 16 + 4 * ssdgs_context_threads(reader->context) : 1;
     olat__reading r;
     olat__seen seen;
     memset(&seen, 0, sizeof seen);
     memset(&r, 0, sizeof r);
+    r.lenses = lenses;
+    r.downscale = downscale;
     r.found = (olat__found *)calloc((size_t)most, sizeof *r.found);
     r.waits = (char *)calloc((size_t)out->count, 1);
     if (!r.found || !r.waits) j->failed = olat__fail(j->error, "out of memory");
@@ -751,17 +817,25 @@ static void olat__read_photos(olat__json *j, const olat_reader *reader, olat_dat
 static void olat__read_frames(olat__json *j, const char *folder, int flags, const double *origin,
                               const olat_reader *reader, olat_dataset *out) {
     const olat__node *root = j->nodes, *frames = olat__find(j, root, "frames");
+    const int downscale = flags >> 8 ? flags >> 8 : 1;
     int oblong = 0;
     olat__lens top;
     memset(&top, 0, sizeof top);
     olat__read_lens(j, root, &top);
+    out->has_bounds = olat__get(j, root, "bounds_min", 3, out->bounds[0]) &&
+                      olat__get(j, root, "bounds_max", 3, out->bounds[1]);
+    for (int c = 0; c < 3 && out->has_bounds; c++)
+        if (!(out->bounds[0][c] < out->bounds[1][c]))
+            olat__json_fail(j, root, "bounds_min is not below bounds_max");
     if (root->type != OLAT__OBJECT || !frames) olat__json_fail(j, root, "frames is missing");
     else if (frames->type != OLAT__ARRAY) olat__json_fail(j, frames, "an array was expected");
     else if (frames->size < 1 || frames->size > OLAT__MAX_FRAMES)
         olat__json_fail(j, frames, "there must be 1 to 2^20 frames");
     if (j->failed) return;
+    olat__lens *lenses = (olat__lens *)calloc((size_t)frames->size, sizeof *lenses);
     out->frames = (olat_frame *)calloc((size_t)frames->size, sizeof *out->frames);
-    if (!out->frames) {
+    if (!out->frames || !lenses) {
+        free(lenses);
         olat__json_fail(j, frames, "out of memory");
         return;
     }
@@ -780,22 +854,26 @@ static void olat__read_frames(olat__json *j, const char *folder, int flags, cons
          i++, node = &j->nodes[node->next]) {
         olat_frame *frame = &out->frames[i];
         if (node->type != OLAT__OBJECT) olat__json_fail(j, node, "an object was expected");
-        olat__lens lens = top;
-        olat__read_lens(j, node, &lens);
+        olat__lens *lens = lenses + i;
+        *lens = top;
+        olat__read_lens(j, node, lens);
         olat__read_lights(j, node, out->origin, frame);
         olat__read_paths(j, node, folder, flags, &frame->file, &frame->mask);
-        frame->camera.width = lens.w ? lens.w : olat__side(lens.centre[0]);
-        frame->camera.height = lens.h ? lens.h : olat__side(lens.centre[1]);
+        frame->camera.width = lens->w ? lens->w : olat__side(lens->centre[0]);
+        frame->camera.height = lens->h ? lens->h : olat__side(lens->centre[1]);
     }
-    if (!(flags & OLAT_NO_IMAGES) && !j->failed) olat__read_photos(j, reader, out);
+    if (!(flags & OLAT_NO_IMAGES) && !j->failed) olat__read_photos(j, lenses, downscale, reader, out);
     for (i = 0, node = &j->nodes[frames->child]; i < out->count && !j->failed;
          i++, node = &j->nodes[node->next]) {
-        ssdgs_camera *camera = &out->frames[i].camera;
-        olat__lens lens = top;
-        olat__read_lens(j, node, &lens);
-        olat__read_camera(j, node, &lens, out->origin, camera);
-        oblong += !(lens.focal[0] + lens.focal[1] > 0) && fabs((double)(camera->fx / camera->fy) - 1) > 0.01;
+        const olat__lens *lens = lenses + i;
+        const ssdgs_camera *camera = &out->frames[i].camera;
+        out->frames[i].lens.width = camera->width;
+        out->frames[i].lens.height = camera->height;
+        olat__read_camera(j, node, lens, out->origin, downscale, out->frames + i);
+        oblong +=
+            !(lens->focal[0] + lens->focal[1] > 0) && fabs((double)(camera->fx / camera->fy) - 1) > 0.01;
     }
+    free(lenses);
     if (oblong) {
         olat__note(out, "pixels of %d of the %d frames are not square, by camera_angle_x and camera_angle_y",
                    oblong, out->count);
@@ -928,9 +1006,9 @@ static void olat__json_open(olat__json *j, const char *folder, const char *split
     if (!j->failed) olat__unfold(j, folder);
 }
 
-/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT. out is empty after a
-   failure. Positions become relative to origin, of 3 numbers; NULL chooses one: 0 unless they lie far
-   away. reader may be NULL. */
+/* Reads folder/split_json and its images; flags: OLAT_NO_IMAGES, OLAT_ALLOW_PARENT, OLAT_DOWNSCALE. out is
+   empty after a failure. Positions become relative to origin, of 3 numbers; NULL chooses one: 0 unless they
+   lie far away. reader may be NULL. */
 OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags, const double *origin,
                            const olat_reader *reader, olat_dataset *out, char error[512]) {
     memset(out, 0, sizeof *out);
@@ -1001,16 +1079,29 @@ static void olat__write_light(olat__writer *w, const ssdgs_light *light, const d
 static void olat__write_frame(olat__writer *w, const olat_frame *frame, const double origin[3],
                               const char *folder) {
     static const double last_row[4] = {0, 0, 0, 1};
+    static const char *const keys[12] = {"w",  "h",  "fl_x", "fl_y", "cx", "cy",
+                                         "k1", "k2", "k3",   "k4",   "p1", "p2"};
     const ssdgs_camera *camera = &frame->camera;
     olat__write_path(w, "\"file_path\": ", frame->file, folder);
     olat__write_path(w, "\"mask_path\": ", frame->mask, folder);
     double v[4];
-    v[0] = camera->width, v[1] = camera->height;
-    olat__write_numbers(w, "\"w\": ", v, 1, 9, ", ");
-    olat__write_numbers(w, "\"h\": ", v + 1, 1, 9, ",\n  ");
-    v[0] = (double)camera->cx, v[1] = (double)camera->cy, v[2] = (double)camera->fx,
-    v[3] = (double)camera->fy;
-    olat__write_numbers(w, "\"camera_intrinsics\": [", v, 4, 9, "],\n  \"transform_matrix\": [");
+    olat_lens own = frame->lens;
+    if (!own.width) { /* a frame that was not read */
+        own.width = camera->width, own.height = camera->height;
+        own.focal[0] = (double)camera->fx, own.focal[1] = (double)camera->fy;
+        own.centre[0] = (double)camera->cx, own.centre[1] = (double)camera->cy;
+    }
+    const int bends = olat_lens_bends(&own);
+    const double lens[12] = {own.width, own.height, own.focal[0], own.focal[1], own.centre[0], own.centre[1],
+                             own.k[0],  own.k[1],   own.k[2],     own.k[3],     own.p[0],      own.p[1]};
+    if (bends)
+        olat__write(w, own.fisheye ? "\"camera_model\": \"OPENCV_FISHEYE\", "
+                                   : "\"camera_model\": \"OPENCV\", ");
+    for (int i = 0; i < (bends ? 12 : 6); i++) {
+        olat__write_string(w, keys[i]);
+        olat__write_numbers(w, ": ", lens + i, 1, 16, i == 5 ? ",\n  " : ", ");
+    }
+    olat__write(w, "\"transform_matrix\": [");
     for (int k = 0; k < 3; k++) { /* camera to world, y up and z backward */
         int m;
         for (m = 0, v[3] = origin[k]; m < 3; m++) {
@@ -1035,7 +1126,10 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
 OLAT__API int olat_save(const char *path, const char *folder, const olat_dataset *set, char error[512]) {
     olat__writer w;
     olat__writer_start(&w);
-    olat__write(&w, "{\"frames\": [");
+    olat__write(&w, "{");
+    for (int i = 0; i < 2 && set->has_bounds; i++)
+        olat__write_numbers(&w, i ? "\"bounds_max\": [" : "\"bounds_min\": [", set->bounds[i], 3, 9, "],\n ");
+    olat__write(&w, "\"frames\": [");
     for (int i = 0; i < set->count; i++) {
         olat__write(&w, i ? ",\n {" : "\n {");
         olat__write_frame(&w, &set->frames[i], set->origin, folder);
@@ -1124,6 +1218,16 @@ OLAT__API void olat_eye(const ssdgs_camera *camera, ssdgs_real eye[3]) {
     int k;
     for (int i = 0; i < 3; i++)
         for (k = 0, eye[i] = 0; k < 3; k++) eye[i] -= camera->view[4 * k + i] * camera->view[4 * k + 3];
+}
+
+/* One side of the box that training uses, relative to the dataset's origin: as given in the dataset's
+   coordinates, where infinite the dataset's own, else as it is there. */
+OLAT__API void olat_box_side(const olat_dataset *set, int axis, double low, double high,
+                             ssdgs_train_options *options) {
+    if (!(low < HUGE_VAL)) low = set->has_bounds ? set->bounds[0][axis] : (double)options->bounds_min[axis];
+    if (!(high < HUGE_VAL)) high = set->has_bounds ? set->bounds[1][axis] : (double)options->bounds_max[axis];
+    options->bounds_min[axis] = (ssdgs_real)(low - set->origin[axis]);
+    options->bounds_max[axis] = (ssdgs_real)(high - set->origin[axis]);
 }
 
 /* Whether the list is in another unit than the box that holds the object, as where one has millimetres and

@@ -87,7 +87,8 @@ static const char *const help[] = {
     "  --seed N                 of the random numbers; 1",
     "  --threads N              0 = one per CPU (default); the result does not depend on it",
     "  --isa NAME               scalar, sse2, avx2, avx512 or neon; the best that this machine has",
-    "  --set bounds_min=X,Y,Z   the box that holds the object, in the dataset's units; -0.5,-0.5,-0.5",
+    "  --set bounds_min=X,Y,Z   the box that holds the object, in the dataset's units; the dataset's own,",
+    "                           else -0.5,-0.5,-0.5",
     "  --set bounds_max=X,Y,Z   its other corner; 0.5,0.5,0.5",
     "  --set ambient=R,G,B      even light from the room, where it is known; 0,0,0",
     "  --set NAME=VALUE         a number of ssdgs_settings or ssdgs_train_options; may be repeated",
@@ -117,7 +118,7 @@ static int usage(const char *problem, const char *what) {
     return 2;
 }
 
-/* The bounds in the dataset's coordinates, which may be too large for floats. */
+/* The bounds in the dataset's coordinates, which may be too large for floats; infinite: not given. */
 typedef struct corners {
     double bounds_min[3], bounds_max[3];
 } corners;
@@ -415,10 +416,7 @@ static int parse(job *j, int argc, char **argv) {
     if (given[REFINE])
         j->options.refine =
             SSDGS_REFINE_CAMERA | SSDGS_REFINE_LIGHT | SSDGS_REFINE_INTENSITY | SSDGS_REFINE_AMBIENT;
-    for (int i = 0; i < 3; i++) {
-        j->bounds.bounds_min[i] = (double)j->options.bounds_min[i];
-        j->bounds.bounds_max[i] = (double)j->options.bounds_max[i];
-    }
+    for (int i = 0; i < 3; i++) j->bounds.bounds_min[i] = j->bounds.bounds_max[i] = HUGE_VAL;
     const char *problem;
     for (int i = 0; i < sets; i++)
         if ((problem = set_field(&j->settings, &j->options, &j->bounds, argv[i])) != NULL)
@@ -627,8 +625,7 @@ static int train(job *j) {
     if (strcmp(j->train_set.notes, j->test_set.notes)) olat_print_notes(&j->test_set, "train");
     for (int i = 0; i < 3; i++) {
         j->settings.origin[i] = (ssdgs_real)j->train_set.origin[i];
-        j->options.bounds_min[i] = (ssdgs_real)(j->bounds.bounds_min[i] - j->train_set.origin[i]);
-        j->options.bounds_max[i] = (ssdgs_real)(j->bounds.bounds_max[i] - j->train_set.origin[i]);
+        olat_box_side(&j->train_set, i, j->bounds.bounds_min[i], j->bounds.bounds_max[i], &j->options);
     }
     if (olat_other_unit(&j->train_set, "bounds_min .. bounds_max", j->options.bounds_min,
                         j->options.bounds_max, error))

@@ -1090,7 +1090,7 @@ static void test_datasets(void) {
         {"{\"fl_x\":3,\"cx\":1,\"frames\":[" FRAME "]}", "cx and cy"},
         {"{\"fl_x\":3,\"w\":7,\"frames\":[" FRAME "]}", "6 x 4 pixels"},
         {"{\"w\":1.5,\"frames\":[" FRAME "]}", "w is not"},
-        {"{\"fl_x\":3,\"k1\":0.1,\"frames\":[" FRAME "]}", "k1: distorted"}};
+        {"{\"fl_x\":3,\"k5\":0.1,\"frames\":[" FRAME "]}", "k5: this lens"}};
     unsigned char pixels[6 * 4 * 3];
     for (size_t i = 0; i < sizeof pixels; i++) pixels[i] = (unsigned char)i;
     MAKE_FOLDER(FOLDER "/b");
@@ -1212,16 +1212,19 @@ static void test_lenses(void) {
                                             {"\"RADIAL\"", "1"},
                                             {"null", "1"},
                                             {"\"\"", "1"},
-                                            {"\"OPENCV_FISHEYE\"", "OPENCV_FISHEYE: distorted"},
-                                            {"\"EQUIRECTANGULAR\"", "EQUIRECTANGULAR: distorted"},
-                                            {"\"equirectangular\"", "equirectangular: distorted"},
-                                            {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: distorted"},
-                                            {"\"SPHERICAL\"", "SPHERICAL: distorted"},
-                                            {"\"pinhol\"", "pinhol: distorted"},
-                                            {"\"pinholes\"", "pinholes: distorted"},
-                                            {"7", "distorted"},
-                                            {"true", "true: distorted"},
-                                            {"{\"type\":\"a\"}", "distorted"}};
+                                            {"\"OPENCV_FISHEYE\"", "1"},
+                                            {"\"fisheye\"", "1"},
+                                            {"\"SIMPLE_RADIAL_FISHEYE\"", "1"},
+                                            {"\"RADIAL_FISHEYE\"", "1"},
+                                            {"\"EQUIRECTANGULAR\"", "EQUIRECTANGULAR: this lens"},
+                                            {"\"equirectangular\"", "equirectangular: this lens"},
+                                            {"\"THIN_PRISM_FISHEYE\"", "THIN_PRISM_FISHEYE: this lens"},
+                                            {"\"SPHERICAL\"", "SPHERICAL: this lens"},
+                                            {"\"pinhol\"", "pinhol: this lens"},
+                                            {"\"pinholes\"", "pinholes: this lens"},
+                                            {"7", "this lens"},
+                                            {"true", "true: this lens"},
+                                            {"{\"type\":\"a\"}", "this lens"}};
     static const char *const values[][2] = {{"0", "1"},
                                             {"-0.0", "1"},
                                             {"null", "1"},
@@ -1229,15 +1232,14 @@ static void test_lenses(void) {
                                             {"[]", "1"},
                                             {"[0,0.0,[false,null]]", "1"},
                                             {"{\"a\":0}", "1"},
-                                            {"1e-9", "distorted"},
-                                            {"-0.1", "distorted"},
-                                            {"true", "true: distorted"},
-                                            {"[0,0,0,1e-300]", "distorted"},
-                                            {"{\"a\":[0,-1]}", "distorted"},
-                                            {"\"0.1\"", "0.1: distorted"},
-                                            {"\"opencv\"", "opencv: distorted"}};
-    static const char *const others[] = {"is_fisheye",
-                                         "b1",
+                                            {"1e-9", "this lens"},
+                                            {"-0.1", "this lens"},
+                                            {"true", "true: this lens"},
+                                            {"[0,0,0,1e-300]", "this lens"},
+                                            {"{\"a\":[0,-1]}", "this lens"},
+                                            {"\"0.1\"", "0.1: this lens"},
+                                            {"\"opencv\"", "opencv: this lens"}};
+    static const char *const others[] = {"b1",
                                          "b2",
                                          "skew",
                                          "ftheta_p0",
@@ -1285,15 +1287,33 @@ static void test_lenses(void) {
     for (size_t k = 0; k < 27 + sizeof others / sizeof *others; k++) {
         char key[8];
         snprintf(key, sizeof key, "%c%d", "kps"[k / 9 % 3], (int)(k % 9) + 1);
-        for (size_t i = 0; i < sizeof values / sizeof *values; i++)
-            CHECK(*values[i][1] == '1'
-                      ? lens_loads(k < 27 ? key : others[k - 27], values[i][0])
-                      : lens_fails(k < 27 ? key : others[k - 27], values[i][0], values[i][1]));
+        const int known = k < 3 || k == 9 || k == 10,
+                  is_number = known || k == 3; /* 3: k4, of fisheyes alone */
+        for (size_t i = 0; i < sizeof values / sizeof *values; i++) {
+            const int number = values[i][0][0] == '1' || values[i][0][0] == '-',
+                      fine = !strcmp(values[i][1], "1") || (known && number);
+            const char *name = k < 27 ? key : others[k - 27], *wanted = !is_number || number ? values[i][1]
+                                                                        : values[i][0][0] == '[' ? "1 number"
+                                                                                                 : "a number";
+            CHECK(fine ? lens_loads(name, values[i][0]) : lens_fails(name, values[i][0], wanted));
+        }
     }
-    CHECK(lens_fails("k1", "1",
-                     "distorted lenses are not supported: undistort the images first, with COLMAP's"
-                     " image_undistorter or Metashape's Export > Undistort, say"));
+    CHECK(
+        lens_fails("k5", "1",
+                   "this lens is not supported: OpenCV's k1, k2, k3, p1, p2 are, and its fisheye's k1 .. k4. "
+                   "Undistort the images first, with COLMAP's image_undistorter, say"));
     CHECK(lens_loads("k10", "1") && lens_loads("k0", "1")); /* not of any model's */
+    for (int i = 0; i < 3; i++) {                           /* a frame's lens is known by the top's model */
+        static const char *const rest[3] = {"k4\":0.1}]}", "p1\":0.1}]}", "p2\":0.1}]}"};
+        char text[1200];
+        snprintf(text, sizeof text,
+                 "{\"camera_model\":\"OPENCV_FISHEYE\",\"camera_angle_x\":1,\"frames\":[{" LIGHT POSE ",\"%s",
+                 rest[i]);
+        if (i) CHECK(load_fails(text, OLAT_NO_IMAGES, "this lens"));
+        else CHECK(loads(text, OLAT_NO_IMAGES) && set.frames->lens.fisheye && set.frames->lens.k[3] == 0.1);
+        if (!i) olat_free(&set);
+    }
+    CHECK(load_fails(TOP "{" LIGHT POSE ",\"k1\":-1e6}]}", OLAT_NO_IMAGES, "leave no picture"));
     CHECK(live == 0);
 }
 

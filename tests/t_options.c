@@ -175,7 +175,7 @@ static void test_set(void) {
         const double *at = corner ? parsed.bounds.bounds_max : parsed.bounds.bounds_min,
                      *other = corner ? parsed.bounds.bounds_min : parsed.bounds.bounds_max;
         CHECK(at[0] == 1000001 && at[1] == 2.5 && at[2] == 3);
-        for (int k = 0; k < 3; k++) CHECK(other[k] == (corner ? -0.5 : 0.5));
+        for (int k = 0; k < 3; k++) CHECK(!(other[k] < HUGE_VAL));
         CHECK(elsewhere_alike(0, NULL, 0));
     }
 }
