@@ -3342,7 +3342,7 @@ typedef struct ssdgs__scratch {
         pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, median, empty, activations,
         scratch;
     ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
-        splat_gradient, color_gradient, gradient, global_gradient, loss, target, normals, photo_lights;
+        splat_gradient, color_gradient, gradient, global_gradient, loss, target, photo_lights;
 } ssdgs__scratch;
 
 static void ssdgs__buffers_release(ssdgs_context *context, void *buffers, size_t bytes) {
@@ -8498,13 +8498,13 @@ typedef struct ssdgs__loss_values {
     double loss, l1, ssim, mse;
 } ssdgs__loss_values;
 
-typedef struct ssdgs__loss_job {
+typedef struct ssdgs__loss_job { /* of one channel: a photograph may have many pixels */
     const ssdgs__kernels *k;
-    const ssdgs_real *image, *target; /* (3, h, w) */
-    ssdgs_real *gradient;             /* (3, h, w), may be NULL */
-    ssdgs_real *padded[5];            /* image, target, three derivative planes: (3, h + 10, stride) */
-    ssdgs_real *scratch;              /* (tasks, 5, stride) */
-    double *sums;                     /* (tasks, 3) */
+    const ssdgs_real *image, *target; /* (h, w) */
+    ssdgs_real *gradient;             /* (h, w) */
+    ssdgs_real *padded[5];            /* image, target, three derivative planes: (h + 10, stride) */
+    ssdgs_real *scratch;              /* (bands, 5, stride) */
+    double *sums;                     /* (bands, 3) */
     size_t stride;
     int width, height, bands;
     ssdgs_real by_l1, by_ssim;
@@ -8513,34 +8513,32 @@ typedef struct ssdgs__loss_job {
 /* Rows of whole vectors with a border of 16 columns. */
 static size_t ssdgs__padded_stride(int width) { return (size_t)(width + 15) / 16 * 16 + 32; }
 
-static size_t ssdgs__padded_at(const ssdgs__loss_job *job, int channel, int y) { /* row y, column 0 */
-    return ((size_t)channel * (size_t)(job->height + 10) + (size_t)(y + 5)) * job->stride + 16;
+static size_t ssdgs__padded_at(const ssdgs__loss_job *job, int y) { /* row y, column 0 */
+    return (size_t)(y + 5) * job->stride + 16;
 }
 
 /* Copies a band into the padded planes; the first and last also own the border rows. */
-static void ssdgs__loss_pad_task(void *data, int index) {
+static void ssdgs__loss_pad_task(void *data, int band) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
-    const int channel = index / job->bands, band = index % job->bands, w = job->width;
-    const int begin = band ? band * SSDGS__BAND : -5,
+    const int w = job->width, begin = band ? band * SSDGS__BAND : -5,
               end = band == job->bands - 1 ? job->height + 5 : (band + 1) * SSDGS__BAND;
     for (int y = begin; y < end; y++)
         for (int p = 0; p < 5; p++) {
             const ssdgs_real outside =
                 p < 2 ? (ssdgs_real)-0.5 : 0; /* black, less the 1/2 the kernel expects */
             const int inside = y >= 0 && y < job->height;
-            ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, channel, y) - 16;
+            ssdgs_real *to = job->padded[p] + ssdgs__padded_at(job, y) - 16;
             for (int x = 0; x < 16; x++) to[x] = outside;
             for (int x = 0; x < w && !inside; x++) to[16 + x] = outside;
             for (int x = 16 + w; x < (int)job->stride; x++) to[x] = outside;
             if (!inside || p > 1) continue; /* ssim_row writes the derivatives */
-            const ssdgs_real *from = (p ? job->target : job->image) +
-                                     ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)w;
+            const ssdgs_real *from = (p ? job->target : job->image) + (size_t)y * (size_t)w;
             for (int x = 0; x < w; x++) to[16 + x] = from[x] - (ssdgs_real)0.5;
         }
 }
 
-static ssdgs__ssim_row ssdgs__loss_row(const ssdgs__loss_job *job, int task, int y) {
-    const size_t at = ssdgs__padded_at(job, task / job->bands, y), scratch = (size_t)task * 5 * job->stride;
+static ssdgs__ssim_row ssdgs__loss_row(const ssdgs__loss_job *job, int band, int y) {
+    const size_t at = ssdgs__padded_at(job, y), scratch = (size_t)band * 5 * job->stride;
     ssdgs_real *const *p = job->padded;
     const ssdgs__ssim_row row = {p[0] + at,   p[1] + at, p[2] + at,
                                  p[3] + at,   p[4] + at, job->scratch + scratch,
@@ -8548,29 +8546,28 @@ static ssdgs__ssim_row ssdgs__loss_row(const ssdgs__loss_job *job, int task, int
     return row;
 }
 
-static void ssdgs__loss_task(void *data, int index) {
+static void ssdgs__loss_task(void *data, int band) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
-    const int begin = index % job->bands * SSDGS__BAND;
+    const int begin = band * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
-    for (int i = 0; i < 3; i++) job->sums[3 * index + i] = 0;
+    for (int i = 0; i < 3; i++) job->sums[3 * band + i] = 0;
     for (int y = begin; y < end; y++) {
-        const ssdgs__ssim_row at = ssdgs__loss_row(job, index, y);
+        const ssdgs__ssim_row at = ssdgs__loss_row(job, band, y);
         ssdgs_real sums[3];
         job->k->ssim_row(&at, sums);
-        for (int i = 0; i < 3; i++) job->sums[3 * index + i] += (double)sums[i];
+        for (int i = 0; i < 3; i++) job->sums[3 * band + i] += (double)sums[i];
     }
 }
 
-static void ssdgs__loss_backward_task(void *data, int index) {
+static void ssdgs__loss_backward_task(void *data, int band) {
     const ssdgs__loss_job *job = (const ssdgs__loss_job *)data;
-    const int channel = index / job->bands, begin = index % job->bands * SSDGS__BAND;
+    const int begin = band * SSDGS__BAND;
     const int end = begin + SSDGS__BAND < job->height ? begin + SSDGS__BAND : job->height;
     for (int y = begin; y < end; y++) {
-        const ssdgs__ssim_row at = ssdgs__loss_row(job, index, y);
+        const ssdgs__ssim_row at = ssdgs__loss_row(job, band, y);
         ssdgs_real *row = at.scratch + 4 * job->stride;
         job->k->ssim_backward_row(&at, job->by_l1, job->by_ssim, row);
-        memcpy(job->gradient + ((size_t)channel * (size_t)job->height + (size_t)y) * (size_t)job->width, row,
-               (size_t)job->width * sizeof *row);
+        memcpy(job->gradient + (size_t)y * (size_t)job->width, row, (size_t)job->width * sizeof *row);
     }
 }
 
@@ -8585,32 +8582,36 @@ static ssdgs_result ssdgs__loss(ssdgs_context *context, ssdgs__buffer *memory, c
                                 ssdgs_real dssim, ssdgs_real *gradient, ssdgs__loss_values *values) {
     const int width = images->width, height = images->height;
     ssdgs__loss_job job;
+    const size_t channel = (size_t)width * (size_t)height;
     const double pixels = 3.0 * width * height;
     double sum[3] = {0, 0, 0};
     memset(&job, 0, sizeof job);
     job.k = context->k;
-    job.image = images->image;
-    job.target = images->target;
-    job.gradient = gradient;
     job.width = width;
     job.height = height;
     job.bands = (height + SSDGS__BAND - 1) / SSDGS__BAND;
     job.stride = ssdgs__padded_stride(width);
-    const size_t plane = 3 * (size_t)(height + 10) * job.stride;
-    const int tasks = 3 * job.bands;
+    const size_t plane = (size_t)(height + 10) * job.stride, bands = (size_t)job.bands;
     ssdgs_real *at;
-    SSDGS__RESERVE(*memory, at, ssdgs_real, 6 * (size_t)tasks + 5 * plane + (size_t)tasks * 5 * job.stride);
+    SSDGS__RESERVE(*memory, at, ssdgs_real, 6 * bands + 5 * plane + bands * 5 * job.stride);
     job.sums = (double *)memory->memory;
-    at += 6 * (size_t)tasks;
+    at += 6 * bands;
     for (int i = 0; i < 5; i++, at += plane) job.padded[i] = at;
     job.scratch = at;
     job.by_l1 = (ssdgs_real)((1 - (double)dssim) / pixels);
     job.by_ssim = (ssdgs_real)(-(double)dssim / pixels);
-    ssdgs__parallel(context, tasks, ssdgs__loss_pad_task, &job);
-    ssdgs__parallel(context, tasks, ssdgs__loss_task, &job);
-    if (gradient) ssdgs__parallel(context, tasks, ssdgs__loss_backward_task, &job);
-    for (int i = 0; i < tasks; i++)
-        for (int j = 0; j < 3; j++) sum[j] += job.sums[3 * i + j];
+    for (size_t c = 0; c < 3; c++) {
+        job.image = images->image + c * channel;
+        job.target = images->target + c * channel;
+        ssdgs__parallel(context, job.bands, ssdgs__loss_pad_task, &job);
+        ssdgs__parallel(context, job.bands, ssdgs__loss_task, &job);
+        if (gradient) {
+            job.gradient = gradient + c * channel;
+            ssdgs__parallel(context, job.bands, ssdgs__loss_backward_task, &job);
+        }
+        for (int i = 0; i < job.bands; i++)
+            for (int j = 0; j < 3; j++) sum[j] += job.sums[3 * i + j];
+    }
     values->ssim = sum[0] / pixels;
     values->l1 = sum[1] / pixels;
     values->mse = sum[2] / pixels;
@@ -10340,7 +10341,8 @@ static ssdgs_result ssdgs__normals_loss(ssdgs_frame *frame, ssdgs_real weight) {
     frame->normal_gradient = NULL;
     if (!frame->layer_count || weight <= 0) return SSDGS_OK;
     const size_t stride = ssdgs__padded_stride(frame->camera.width);
-    SSDGS__RESERVE(frame->scratch->normals, frame->normal_gradient, ssdgs_real,
+    /* where the loss of the colours was found, which is done */
+    SSDGS__RESERVE(frame->scratch->loss, frame->normal_gradient, ssdgs_real,
                    4 * pixels + (size_t)bands * (SSDGS__BAND + 6) * stride);
     ssdgs__normals_job job = {frame, weight / (ssdgs_real)pixels, frame->normal_gradient + 4 * pixels,
                               stride};
