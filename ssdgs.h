@@ -893,12 +893,14 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 
 #ifndef SSDGS_NO_STDIO
 /* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
-   and settings; else ERR_FORMAT names the first that differs. */
+   and settings; else ERR_FORMAT names the first that differs. Only iterations, max_gaussians and rates may be
+   others, which the log tells: the rest of the run is then as one of these is from there on. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
-/* How far the run of a checkpoint had come. ERR_IO without a file, ERR_FORMAT where it is no checkpoint of
-   this version. */
-SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration);
+/* How far the run of a checkpoint had come, of how many iterations (may be NULL). ERR_IO without a file,
+   ERR_FORMAT where it is no checkpoint of this version. */
+SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration,
+                                                  int *iterations);
 #endif
 
 typedef struct ssdgs_metrics {
@@ -12137,6 +12139,12 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
 
 #define SSDGS__ANOTHER ": a run goes on with the same options, settings and photographs"
 
+/* Options that may change in the midst of a run. */
+static int ssdgs__may_change(const ssdgs__number *n) {
+    return !strncmp(n->name, "rates.", 6) || !strcmp(n->name, "iterations") ||
+           !strcmp(n->name, "max_gaussians");
+}
+
 /* Compares a checkpoint's numbers with the trainer's. */
 static ssdgs_result ssdgs__checkpoint_numbers(ssdgs_context *context, const char *path,
                                               const ssdgs__number *list, int count, const void *there,
@@ -12146,11 +12154,14 @@ static ssdgs_result ssdgs__checkpoint_numbers(ssdgs_context *context, const char
             const unsigned char *was = (const unsigned char *)there + ssdgs__number_at(n, i),
                                 *is = (const unsigned char *)here + ssdgs__number_at(n, i);
             const char index[4] = {'[', (char)('0' + i), ']', 0};
-            if (memcmp(was, is, ssdgs__number_size(n->type)))
+            if (!memcmp(was, is, ssdgs__number_size(n->type))) continue;
+            const double values[2] = {ssdgs__number_get(n->type, was), ssdgs__number_get(n->type, is)};
+            if (!ssdgs__may_change(n))
                 return ssdgs__fail(context, SSDGS_ERR_FORMAT,
                                    "%s: %s%s was %g in its run and is %g now" SSDGS__ANOTHER, path, n->name,
-                                   n->count ? index : "", ssdgs__number_get(n->type, was),
-                                   ssdgs__number_get(n->type, is));
+                                   n->count ? index : "", values[0], values[1]);
+            ssdgs__note(context, "%s: %s was %g in its run and is %g now", path, n->name, values[0],
+                        values[1]);
         }
     return SSDGS_OK;
 }
@@ -12247,10 +12258,12 @@ SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *pa
     SSDGS__GUARD(trainer, trainer->context, "ssdgs_trainer_load", ssdgs__trainer_load(trainer, path));
 }
 
-SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration) {
+SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const char *path, int *iteration,
+                                                  int *iterations) {
     unsigned char *bytes = NULL;
     size_t size = 0;
     if (iteration) *iteration = 0;
+    if (iterations) *iterations = 0;
     SSDGS__BEGIN(context, context, "ssdgs_checkpoint_iteration");
     ssdgs_result result = SSDGS_OK;
     if (!path || !iteration)
@@ -12261,6 +12274,7 @@ SSDGS_API ssdgs_result ssdgs_checkpoint_iteration(ssdgs_context *context, const 
         const char *reason = ssdgs__checkpoint_head_of(bytes, size, &head);
         if (reason) result = ssdgs__fail(context, SSDGS_ERR_FORMAT, "%s: %s", path, reason);
         else *iteration = head.run.iteration;
+        if (!reason && iterations) *iterations = head.options.iterations;
     }
     ssdgs__release(context, bytes);
     return ssdgs__leave(context, result);

@@ -520,7 +520,7 @@ static int check_checkpoint(job *j, char error[512]) {
     if (!file) return 0;
     fclose(file);
     int done;
-    if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done))
+    if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done, NULL))
         return sprintf(error, "%.300s, and would be replaced: remove it, or give another name with -o",
                        ssdgs_error_message(j->context)),
                1;

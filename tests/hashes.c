@@ -153,7 +153,7 @@ static ssdgs_result train_else(ssdgs_model *model) {
 /* The bytes of a checkpoint, of train_else(). */
 static ssdgs_result checkpoint(ssdgs_model *model) {
     int iteration = 0;
-    ssdgs_result result = ssdgs_checkpoint_iteration(context, path[0], &iteration);
+    ssdgs_result result = ssdgs_checkpoint_iteration(context, path[0], &iteration, NULL);
     see(&iteration, sizeof iteration);
     return result ? result : see_file(path[0]);
 }

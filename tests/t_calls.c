@@ -147,7 +147,7 @@ static void call_everything(void) {
     REFUSED(ssdgs_camera_from_matrices, context, matrix, matrix, 0, 4, 4, &copy.camera);
     REFUSED(ssdgs_depth_from_buffer, context, matrix, 0, floats, 4, 1, 1, matrix);
     REFUSED(ssdgs_compare, context, color, color, 4, 4, &metrics);
-    REFUSED(ssdgs_checkpoint_iteration, context, FILE_NAME, &iteration);
+    REFUSED(ssdgs_checkpoint_iteration, context, FILE_NAME, &iteration, NULL);
     REFUSED(ssdgs_render_ex, model, &photo.camera, &photo.light, 1, NULL, &image, NULL);
     REFUSED(ssdgs_model_create, context, NULL, 1, &other);
     REFUSED(ssdgs_render, model, &photo.camera, &photo.light, 1, &image);
@@ -628,9 +628,9 @@ static void test_null(void) {
     NAMES(ssdgs_trainer_save(all.trainer, NULL), "ssdgs_trainer_save: path is NULL");
     NAMES(ssdgs_trainer_load(all.trainer, NULL), "ssdgs_trainer_load: path is NULL");
     int iteration;
-    NAMES(ssdgs_checkpoint_iteration(all.context, NULL, &iteration),
+    NAMES(ssdgs_checkpoint_iteration(all.context, NULL, &iteration, NULL),
           "ssdgs_checkpoint_iteration: path is NULL");
-    NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL),
+    NAMES(ssdgs_checkpoint_iteration(all.context, FILE_NAME, NULL, NULL),
           "ssdgs_checkpoint_iteration: iteration is NULL");
     CHECK(!other);
     CHECK(ssdgs_render(NULL, &photo.camera, NULL, 0, &image) && ssdgs_model_sort(NULL) &&

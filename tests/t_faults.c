@@ -405,7 +405,7 @@ static ssdgs_result do_scene(void) {
 static ssdgs_result do_bounds(void) { return ssdgs_model_bounds(model, planes[0], planes[0] + 3); }
 static ssdgs_result do_iteration(void) {
     int iteration = -1;
-    const ssdgs_result result = ssdgs_checkpoint_iteration(context, run_path, &iteration);
+    const ssdgs_result result = ssdgs_checkpoint_iteration(context, run_path, &iteration, NULL);
     planes[0][0] = (ssdgs_real)(result ? 0 : iteration);
     return result;
 }
@@ -898,16 +898,20 @@ static void test_checkpoints(void) {
         const size_t held_bytes = memory.bytes;
         spill(file_path, whole.data, sizeof h + 8);
         memory.peak = held_bytes;
-        CHECK(!ssdgs_checkpoint_iteration(context, run_path, &iteration) && iteration == h.run.iteration);
+        CHECK(!ssdgs_checkpoint_iteration(context, run_path, &iteration, NULL) &&
+              iteration == h.run.iteration);
         CHECK(memory.peak - held_bytes < 4096);
-        CHECK(!ssdgs_checkpoint_iteration(context, file_path, &iteration) && iteration == h.run.iteration);
+        CHECK(!ssdgs_checkpoint_iteration(context, file_path, &iteration, NULL) &&
+              iteration == h.run.iteration);
         spill(file_path, whole.data, sizeof h + 7);
-        CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration) == SSDGS_ERR_FORMAT && !iteration);
+        CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration, NULL) == SSDGS_ERR_FORMAT &&
+              !iteration);
         head lie = h;
         lie.run.iteration = -5;
         memcpy(whole.data, &lie, sizeof lie);
         spill(file_path, whole.data, whole.size);
-        CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration) == SSDGS_ERR_FORMAT && !iteration);
+        CHECK(ssdgs_checkpoint_iteration(context, file_path, &iteration, NULL) == SSDGS_ERR_FORMAT &&
+              !iteration);
         memcpy(whole.data, &h, sizeof h);
     }
     ssdgs_settings settings;

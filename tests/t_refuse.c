@@ -494,19 +494,19 @@ static void test_messages(void) {
 static void test_checkpoint(ssdgs_trainer *trainer) {
     static const char path[] = "build/t_refuse.run";
     int iteration = 7;
-    MISSING(ssdgs_checkpoint_iteration(NULL, path, &iteration));
-    MISSING(ssdgs_checkpoint_iteration(context, NULL, &iteration));
-    MISSING(ssdgs_checkpoint_iteration(context, path, NULL));
+    MISSING(ssdgs_checkpoint_iteration(NULL, path, &iteration, NULL));
+    MISSING(ssdgs_checkpoint_iteration(context, NULL, &iteration, NULL));
+    MISSING(ssdgs_checkpoint_iteration(context, path, NULL, NULL));
     for (int i = 0; i < 3; i++) {
         CHECK(!ssdgs_trainer_save(trainer, path));
-        CHECK(!ssdgs_checkpoint_iteration(context, path, &iteration) && iteration == i);
+        CHECK(!ssdgs_checkpoint_iteration(context, path, &iteration, NULL) && iteration == i);
         CHECK(!ssdgs_trainer_step(trainer, NULL));
     }
     CHECK(!ssdgs_model_save(model, path));
-    CHECK(ssdgs_checkpoint_iteration(context, path, &iteration) == SSDGS_ERR_FORMAT);
+    CHECK(ssdgs_checkpoint_iteration(context, path, &iteration, NULL) == SSDGS_ERR_FORMAT);
     CHECK(strstr(ssdgs_error_message(context), path) != NULL);
     remove(path);
-    CHECK(ssdgs_checkpoint_iteration(context, path, &iteration) == SSDGS_ERR_IO);
+    CHECK(ssdgs_checkpoint_iteration(context, path, &iteration, NULL) == SSDGS_ERR_IO);
     CHECK(strstr(ssdgs_error_message(context), path) != NULL);
 }
 
