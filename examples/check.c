@@ -467,7 +467,7 @@ static int run(check *k) {
         k->found[s] = (facts *)calloc((size_t)k->sets[s].count, sizeof **k->found);
         if (!k->found[s]) return fail("out of memory");
         for (int c = 0; c < 3 && !s; c++) {
-            olat_box_side(k->sets, c, k->box[c], k->box[3 + c], &k->options);
+            olat_box_side(k->sets, c, k->box[c], k->box[3 + c], k->options.bounds_min, k->options.bounds_max);
             k->middle[c] = (double)(k->options.bounds_min[c] + k->options.bounds_max[c]) / 2;
         }
         for (int i = 0; i < k->sets[s].count && !failed; i++) {

@@ -52,11 +52,6 @@ OLAT__PRINTF(1, 2) static void note(const char *format, ...) {
     fprintf(stderr, "\n");
 }
 
-static int exists(const char *path) {
-    struct stat there;
-    return stat(path, &there) == 0 && S_ISREG(there.st_mode);
-}
-
 /* ---- the model ---- */
 
 static int has_model(const char *folder) {
@@ -64,7 +59,7 @@ static int has_model(const char *folder) {
     int found = 0;
     for (int i = 0; i < 2; i++) {
         snprintf(path, sizeof path, "%.3000s/images.%s", folder, i ? "txt" : "bin");
-        found |= exists(path);
+        found |= olat_exists(path);
     }
     return found;
 }
@@ -110,11 +105,11 @@ static const char *find_file(const char *folder, const char *name, int is_mask, 
     const char *dot = strrchr(name, '.');
     const int stem = dot && !strchr(dot, '/') ? (int)(dot - name) : (int)strlen(name);
     snprintf(path, OLAT__MAX_PATH, "%.1000s/%.1000s.png", folder, name); /* as COLMAP's own masks are named */
-    if (is_mask && exists(path)) return path + strlen(folder) + 1;
+    if (is_mask && olat_exists(path)) return path + strlen(folder) + 1;
     for (int i = 0; i < 8; i++) {
         snprintf(path, OLAT__MAX_PATH, "%.1000s/%.*s%s", folder, i ? stem : (int)strlen(name), name,
                  endings[i]);
-        if (exists(path)) return path + strlen(folder) + 1;
+        if (olat_exists(path)) return path + strlen(folder) + 1;
     }
     return NULL;
 }

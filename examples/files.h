@@ -117,6 +117,11 @@ OLAT__API int olat__same_letters(const char *text, const char *lower, size_t len
     return i == length;
 }
 
+OLAT__API int olat_exists(const char *path) {
+    struct stat there;
+    return stat(path, &there) == 0 && S_ISREG(there.st_mode);
+}
+
 /* Reads a regular file whole and appends a NUL. */
 OLAT__API int olat__read_file(const char *path, unsigned char **data, size_t *size, char *error) {
     const char *problem = NULL;

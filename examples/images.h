@@ -1710,6 +1710,11 @@ OLAT__API int olat__is_light(ssdgs_pixels format) {
     return format == SSDGS_PIXELS_RGBA16F || format == SSDGS_PIXELS_RGBA32F;
 }
 
+/* Bytes of a number. */
+OLAT__API size_t olat__number_size(ssdgs_pixels format) {
+    return format == SSDGS_PIXELS_RGBA8 ? 1 : format == SSDGS_PIXELS_RGBA32F ? 4 : 2;
+}
+
 /* A number of a photograph of bytes or words. */
 static unsigned olat__sample(const void *pixels, ssdgs_pixels format, size_t i) {
     return format == SSDGS_PIXELS_RGBA16 ? ((const uint16_t *)pixels)[i] : ((const unsigned char *)pixels)[i];

@@ -129,9 +129,7 @@ OLAT__API void *olat_resample(const void *pixels, ssdgs_pixels format, const ola
                  top = format == SSDGS_PIXELS_RGBA16 ? 65535 : 255;
     float *light = (float *)malloc(count * sizeof *light),
           *table = (float *)malloc((top + 1) * sizeof *table);
-    unsigned char *out = (unsigned char *)malloc(made * (format == SSDGS_PIXELS_RGBA8     ? 1
-                                                         : format == SSDGS_PIXELS_RGBA32F ? 4
-                                                                                          : 2));
+    unsigned char *out = (unsigned char *)malloc(made * olat__number_size(format));
     if (!light || !table || !out) {
         free(light), free(table), free(out);
         return NULL;

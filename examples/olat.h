@@ -986,7 +986,8 @@ OLAT__API void olat_free(olat_dataset *set) {
     memset(set, 0, sizeof *set);
 }
 
-/* Reads and parses folder/split_json; whatever came of it, olat__json_close frees it. */
+/* Reads and parses folder/split_json; whatever came of it, olat__json_close frees it. nerfstudio's list is
+   transforms.json. */
 static void olat__json_open(olat__json *j, const char *folder, const char *split_json, char *error) {
     const size_t room = strlen(folder) + strlen(split_json) + 2;
     unsigned char *text = NULL;
@@ -998,6 +999,11 @@ static void olat__json_open(olat__json *j, const char *folder, const char *split
         return;
     }
     snprintf(j->path, room, "%s%s%s", folder, folder[0] ? "/" : "", split_json);
+    if (!strcmp(split_json, "transforms_train.json") && !olat_exists(j->path)) {
+        snprintf(j->path, room, "%s%stransforms.json", folder, folder[0] ? "/" : "");
+        if (!olat_exists(j->path))
+            snprintf(j->path, room, "%s%s%s", folder, folder[0] ? "/" : "", split_json);
+    }
     j->failed = olat__read_file(j->path, &text, &size, error);
     if (j->failed) return;
     j->text = (char *)text;
@@ -1014,6 +1020,10 @@ OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags
     memset(out, 0, sizeof *out);
     olat__json j;
     olat__json_open(&j, folder, split_json, error);
+    const size_t length = strlen(split_json);
+    if (!j.failed &&
+        strcmp(j.path + (strlen(j.path) > length ? strlen(j.path) - length : 0), split_json) != 0)
+        olat__note(out, "there is no %s: transforms.json is read", split_json);
     if (!j.failed) olat__read_frames(&j, folder, flags, origin, reader, out);
     if (j.failed) olat_free(out);
     olat__json_close(&j);
@@ -1023,6 +1033,38 @@ OLAT__API int olat_load_at(const char *folder, const char *split_json, int flags
 OLAT__API int olat_load(const char *folder, const char *split_json, int flags, olat_dataset *out,
                         char error[512]) {
     return olat_load_at(folder, split_json, flags, NULL, NULL, out, error);
+}
+
+/* What the photographs of a list take in memory, in bytes, the pixels of one, and how many of them are not
+   transparent, judged by the first one without its mask. */
+OLAT__API int olat_memory(const char *folder, const char *split_json, int flags, double *bytes,
+                          double *pixels, double *shown, char error[512]) {
+    olat__json j;
+    olat__json_open(&j, folder, split_json, error);
+    const olat__node *frames = j.failed ? NULL : olat__find(&j, j.nodes, "frames");
+    char *files[2] = {NULL, NULL};
+    *bytes = *pixels = *shown = 0;
+    if (frames && frames->size) /* what is wrong with the list is told when it is read */
+        olat__read_paths(&j, &j.nodes[frames->child], folder, flags, &files[0], &files[1]);
+    if (files[0] && !j.failed) {
+        olat__found found;
+        int width, height;
+        ssdgs_pixels format;
+        void *image;
+        memset(&found, 0, sizeof found);
+        j.failed = olat__image_file(files[0], 0, &width, &height, &format, &image, &found, error);
+        if (!j.failed) {
+            const int times = flags >> 8 ? flags >> 8 : 1;
+            *pixels = (double)(width / times) * (height / times);
+            *bytes = 4 * (double)olat__number_size(format) * frames->size * *pixels;
+            for (size_t i = 0; i < (size_t)width * (size_t)height; i++)
+                *shown += (double)olat__number(image, format, 4 * i + 3) / (times * times);
+            free(image);
+        }
+    }
+    for (int k = 0; k < 2; k++) free(files[k]);
+    olat__json_close(&j);
+    return j.failed;
 }
 
 /* A dataset as input: the JSON, and the images and masks that it names as far as it can be read. */
@@ -1222,12 +1264,12 @@ OLAT__API void olat_eye(const ssdgs_camera *camera, ssdgs_real eye[3]) {
 
 /* One side of the box that training uses, relative to the dataset's origin: as given in the dataset's
    coordinates, where infinite the dataset's own, else as it is there. */
-OLAT__API void olat_box_side(const olat_dataset *set, int axis, double low, double high,
-                             ssdgs_train_options *options) {
-    if (!(low < HUGE_VAL)) low = set->has_bounds ? set->bounds[0][axis] : (double)options->bounds_min[axis];
-    if (!(high < HUGE_VAL)) high = set->has_bounds ? set->bounds[1][axis] : (double)options->bounds_max[axis];
-    options->bounds_min[axis] = (ssdgs_real)(low - set->origin[axis]);
-    options->bounds_max[axis] = (ssdgs_real)(high - set->origin[axis]);
+OLAT__API void olat_box_side(const olat_dataset *set, int axis, double low, double high, ssdgs_real *min,
+                             ssdgs_real *max) {
+    if (!(low < HUGE_VAL)) low = set->has_bounds ? set->bounds[0][axis] : (double)min[axis];
+    if (!(high < HUGE_VAL)) high = set->has_bounds ? set->bounds[1][axis] : (double)max[axis];
+    min[axis] = (ssdgs_real)(low - set->origin[axis]);
+    max[axis] = (ssdgs_real)(high - set->origin[axis]);
 }
 
 /* Whether the list is in another unit than the box that holds the object, as where one has millimetres and

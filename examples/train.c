@@ -45,16 +45,18 @@ enum {
     TRAIN_JSON,
     SET,
     REFIT,
+    DOWNSCALE,
     RESUME,
     REFINE,
+    KEEP_BEST,
     VIEW,
     OPTION_COUNT /* the flags, RESUME and on, take no value */
 };
 static const char *const option_names[OPTION_COUNT] = {
-    "-o",      "--iterations", "--background", "--preset",        "--transfer", "--schedule",
-    "--terms", "--seed",       "--threads",    "--max-gaussians", "--points",   "--checkpoint-every",
-    "--isa",   "--train-json", "--set",        "--refit",         "--resume",   "--refine",
-    "--view"};
+    "-o",       "--iterations", "--background", "--preset",        "--transfer",  "--schedule",
+    "--terms",  "--seed",       "--threads",    "--max-gaussians", "--points",    "--checkpoint-every",
+    "--isa",    "--train-json", "--set",        "--refit",         "--downscale", "--resume",
+    "--refine", "--keep-best",  "--view"};
 
 static const char *const help[] = {
     "usage: train DATASET -o MODEL.ply [OPTION...]",
@@ -76,9 +78,14 @@ static const char *const help[] = {
     "                           MODEL.ply.refined.json, and even light from the room, into the model",
     "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
     "                           --max-gaussians are left, and trains those for 1000 iterations",
-    "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C does; never",
+    "  --downscale N            photographs, masks and cameras N times smaller: the mean light of N x N "
+    "pixels",
+    "  --keep-best              holds every tenth photograph out and keeps the model that scores best on "
+    "those",
+    "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C and the end do; never",
     "  --view                   shows the model as it trains in the browser: prints the address to open",
-    "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again",
+    "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again. Only",
+    "                           --iterations, --max-gaussians and rates may be others: longer, say",
     "  --points N               random points at the start, of which those outside of the outlines go;",
     "                           10000",
     "  --max-gaussians N        at most so many Gaussians in the end, twice as many before; three eighths of",
@@ -279,15 +286,24 @@ static void on_interrupt(int signal_number) {
     signal(signal_number, SIG_DFL); /* a second Ctrl-C ends the program at once */
 }
 
+enum { BYTES_A_PIXEL = 200, BYTES_A_GAUSSIAN = 3200 }; /* of training, see tests/EXPERIMENTS.md */
+
 typedef struct run {
-    int iterations, batch, checkpoint_every, terminal;
+    int iterations, batch, checkpoint_every, judge_every, terminal;
     int kept; /* iterations in the checkpoint that another run left: it is replaced once this run has done as
                  many */
     int done; /* iterations of this run */
     int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
     double start, drawn, speed, psnr;
+    double best;       /* PSNR of the photographs held out */
+    int best_at;       /* its iteration; -1: none yet */
     view_server *view; /* who watches; NULL */
 } run;
+
+/* Whether the last step came to a multiple. */
+static int is_due(const run *r, int every, int done) {
+    return every && done / every != (done - r->batch) / every;
+}
 
 /* Answers those who watch, and waits while they ask for it. What they see changes no bit of the run. */
 static void show(run *r, const ssdgs_train_stats *stats) {
@@ -338,8 +354,8 @@ static int progress(void *user, const ssdgs_train_stats *stats) {
         r->percent = percent / 5;
     }
     if (r->view) show(r, stats);
-    return !interrupted && (finished || !r->checkpoint_every ||
-                            done / r->checkpoint_every == (done - r->batch) / r->checkpoint_every);
+    return !interrupted &&
+           (finished || !(is_due(r, r->checkpoint_every, done) || is_due(r, r->judge_every, done)));
 }
 
 /* Everything the program holds; main releases it. */
@@ -354,6 +370,7 @@ typedef struct job {
     olat_guard guard;
     olat_dataset train_set, test_set;
     ssdgs_photo *photos, *test_photos;
+    int count, downscale; /* photographs that are trained on; those held out follow */
     ssdgs_context *context;
     ssdgs_model *model;
     ssdgs_trainer *trainer;
@@ -408,8 +425,10 @@ static int parse(job *j, int argc, char **argv) {
         !number(given, START_POINTS, 1, &j->options.initial_points) ||
         !number(given, MAX_GAUSSIANS, 1, &j->options.max_gaussians) ||
         !number(given, CHECKPOINT_EVERY, 1, &j->progress.checkpoint_every) ||
-        !number(given, SEED, 0, &seed) || !number(given, THREADS, 0, &j->desc.threads))
+        !number(given, DOWNSCALE, 1, &j->downscale) || !number(given, SEED, 0, &seed) ||
+        !number(given, THREADS, 0, &j->desc.threads))
         return 2;
+    if (j->downscale > 1024) return usage("--downscale needs a number from 1 to 1024, not", given[DOWNSCALE]);
     if (j->desc.threads > 1024) return usage("--threads needs a number from 0 to 1024, not", given[THREADS]);
     j->options.seed = (uint64_t)seed;
     j->options.background[0] = j->options.background[1] = j->options.background[2] = (ssdgs_real)white;
@@ -519,11 +538,12 @@ static int check_checkpoint(job *j, char error[512]) {
     FILE *file = fopen(j->checkpoint, "rb");
     if (!file) return 0;
     fclose(file);
-    int done;
-    if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done, NULL))
+    int done, all;
+    if (ssdgs_checkpoint_iteration(j->context, j->checkpoint, &done, &all))
         return sprintf(error, "%.300s, and would be replaced: remove it, or give another name with -o",
                        ssdgs_error_message(j->context)),
                1;
+    if (done >= all) return 0; /* its model is there */
     if (done > j->options.iterations)
         return sprintf(error,
                        "%.300s holds a run of %d iterations, and this one of %d would replace it: go on with "
@@ -538,7 +558,7 @@ static int check_checkpoint(job *j, char error[512]) {
 /* The training photographs' cameras and lights as refined, for what follows and in a file beside the
    model. */
 static int save_refined(job *j, char error[512]) {
-    for (int i = 0; i < j->train_set.count; i++) {
+    for (int i = 0; i < j->count; i++) {
         olat_frame *frame = &j->train_set.frames[i];
         ssdgs_trainer_refined(j->trainer, i, &frame->camera, &frame->light);
         j->photos[i].camera = frame->camera;
@@ -549,6 +569,92 @@ static int save_refined(job *j, char error[512]) {
         printf("%s: cameras and lights as refined; in the dataset's folder --train-json reads it\n",
                j->refined);
     return failed;
+}
+
+/* Says what memory the run takes, before it is taken; the first photograph stands for all. */
+static int tell_memory(const job *j, const char *train_json, int has_test, char error[512]) {
+    const double million = 1e6;
+    double photographs = 0, pixels = 0, shown = 0;
+    for (int s = 0; s <= has_test; s++) {
+        double bytes, size, not_clear;
+        if (olat_memory(j->dataset, s ? "transforms_test.json" : train_json, OLAT_DOWNSCALE(j->downscale),
+                        &bytes, &size, &not_clear, error))
+            return 1;
+        photographs += bytes;
+        pixels = fmax(pixels, size);
+        shown = fmax(shown, not_clear);
+    }
+    const double gaussians = j->options.max_gaussians ? j->options.max_gaussians : fmin(50000, 0.375 * shown),
+                 step = BYTES_A_PIXEL * pixels,
+                 model = BYTES_A_GAUSSIAN * gaussians * (double)j->options.surplus,
+                 all = photographs + step + model + 30 * million;
+    fprintf(stderr,
+            "memory: about %.0f MB, %.0f of them for the photographs, %.0f for a step, %.0f for Gaussians",
+            all / million, photographs / million, step / million, model / million);
+    fprintf(stderr,
+            all < 2000 * million         ? "\n"
+            : model > photographs + step ? "; --max-gaussians %.0f would halve it\n"
+                                         : "; --downscale %.0f would take less than half\n",
+            model > photographs + step ? gaussians / 3 : 2.0 * (j->downscale ? j->downscale : 1));
+    return 0;
+}
+
+/* Every tenth photograph goes behind the others, to judge the model by. */
+static int hold_out(job *j) {
+    const int count = j->train_set.count;
+    olat_frame *frames = j->train_set.frames;
+    j->count = count;
+    if (!j->given[KEEP_BEST]) return 0;
+    if (count < 10) return fail("--keep-best needs ten photographs and more");
+    olat_frame *sorted = (olat_frame *)malloc((size_t)count * sizeof *sorted);
+    if (!sorted) return fail("out of memory");
+    j->count = 0;
+    for (int turn = 0, at = 0; turn < 2; turn++)
+        for (int i = 0; i < count; i++)
+            if ((i % 10 == 5) == turn) sorted[at++] = frames[i], j->count += !turn;
+    memcpy(frames, sorted, (size_t)count * sizeof *frames);
+    free(sorted);
+    j->progress.judge_every = j->options.iterations > 20 ? j->options.iterations / 20 : 1;
+    return 0;
+}
+
+/* The mean PSNR of the photographs that are held out. */
+static ssdgs_result score(const job *j, ssdgs_model *model, double *psnr) {
+    const int held = j->train_set.count - j->count;
+    ssdgs_result result = SSDGS_OK;
+    *psnr = 0;
+    for (int i = j->count; i < j->train_set.count && !result; i++) {
+        ssdgs_metrics metrics;
+        result = ssdgs_evaluate(model, j->photos + i, j->options.background, NULL, &metrics);
+        *psnr += metrics.psnr / held;
+    }
+    return result;
+}
+
+/* Judges the model as it is; where it is the best so far it becomes the output. */
+static ssdgs_result judge(job *j) {
+    run *r = &j->progress;
+    double psnr;
+    ssdgs_result result = score(j, j->model, &psnr);
+    const int best = r->best_at < 0 || psnr > r->best;
+    if (!result && best) result = ssdgs_model_save(j->model, j->given[OUTPUT]);
+    if (result) return result;
+    if (best) r->best = psnr, r->best_at = r->done;
+    fprintf(stderr, "%sheld out: PSNR %.2f after %d iterations%s\n", r->terminal ? "\n" : "", psnr, r->done,
+            best ? ", kept" : "");
+    return SSDGS_OK;
+}
+
+/* A run that goes on has kept its best model, which is judged anew. */
+static ssdgs_result judge_kept(job *j) {
+    ssdgs_model *kept = NULL;
+    run *r = &j->progress;
+    ssdgs_result result = SSDGS_OK;
+    if (olat_exists(j->given[OUTPUT])) result = ssdgs_model_load(j->context, j->given[OUTPUT], &kept, NULL);
+    if (kept && !result) result = score(j, kept, &r->best);
+    if (kept && !result) r->best_at = 0;
+    ssdgs_model_destroy(kept);
+    return result;
 }
 
 /* Opens the page that shows the model as it trains. */
@@ -562,7 +668,7 @@ static int watch(job *j, char error[512]) {
     show->count = show->training.on = 1;
     show->training.iterations = j->options.iterations;
     show->training.photos = j->photos;
-    show->training.count = j->train_set.count;
+    show->training.count = j->count;
     for (int c = 0; c < 3; c++) {
         show->middle[c] = (j->options.bounds_min[c] + j->options.bounds_max[c]) / 2;
         show->radius = fmaxf(show->radius, (j->options.bounds_max[c] - j->options.bounds_min[c]) / 2);
@@ -594,11 +700,10 @@ static int train(job *j) {
     sprintf(j->checkpoint, "%s.ckpt", output);
     if (refines) sprintf(j->refined, "%s.refined.json", output);
     sprintf(test_json, "%s/transforms_test.json", j->dataset);
-    FILE *file = fopen(test_json, "rb");
-    const int has_test = file != NULL;
-    if (file) fclose(file);
+    const int has_test = olat_exists(test_json);
     free(test_json);
-    if (check_outputs(j, train_json, error)) return fail(error);
+    if (check_outputs(j, train_json, error) || tell_memory(j, train_json, has_test, error))
+        return fail(error);
 
     if (j->given[VIEW]) {
         j->desc.tracer.stage = view_stage;
@@ -616,29 +721,32 @@ static int train(job *j) {
         for (int i = 0; i < 3; i++) origin[i] = (double)ssdgs_model_settings(j->model)->origin[i];
     }
     const olat_reader reader = {j->context, on_terminal() ? tell_reading : NULL, &start};
-    if (olat_load_at(j->dataset, train_json, 0, j->model ? origin : NULL, &reader, &j->train_set, error))
+    const int flags = OLAT_DOWNSCALE(j->downscale);
+    if (olat_load_at(j->dataset, train_json, flags, j->model ? origin : NULL, &reader, &j->train_set, error))
         return fail(error);
-    if (has_test && olat_load_at(j->dataset, "transforms_test.json", 0, j->train_set.origin, &reader,
+    if (has_test && olat_load_at(j->dataset, "transforms_test.json", flags, j->train_set.origin, &reader,
                                  &j->test_set, error))
         return fail(error);
+    if (hold_out(j)) return 1;
     olat_print_notes(&j->train_set, "train");
     if (strcmp(j->train_set.notes, j->test_set.notes)) olat_print_notes(&j->test_set, "train");
     for (int i = 0; i < 3; i++) {
         j->settings.origin[i] = (ssdgs_real)j->train_set.origin[i];
-        olat_box_side(&j->train_set, i, j->bounds.bounds_min[i], j->bounds.bounds_max[i], &j->options);
+        olat_box_side(&j->train_set, i, j->bounds.bounds_min[i], j->bounds.bounds_max[i],
+                      j->options.bounds_min, j->options.bounds_max);
     }
     if (olat_other_unit(&j->train_set, "bounds_min .. bounds_max", j->options.bounds_min,
                         j->options.bounds_max, error))
         fprintf(stderr, "train: note: %s\n", error);
     j->photos = olat_photos(&j->train_set);
-    if (j->train_set.count < 40 && j->options.iterations > 300 * j->train_set.count)
+    if (j->count < 40 && j->options.iterations > 300 * j->count && !j->given[KEEP_BEST])
         fprintf(stderr,
                 "train: note: %d iterations are many for %d photographs: these may be learnt by heart while "
-                "other "
-                "views and lights gain nothing. Try --iterations %d, or take more photographs\n",
-                j->options.iterations, j->train_set.count, 100 * j->train_set.count);
+                "other views and lights gain nothing. Try --keep-best, --iterations %d, or take more "
+                "photographs\n",
+                j->options.iterations, j->count, 100 * j->count);
     if (!j->photos || hull_judge(&j->train_set, &j->options, &j->desc.logger) ||
-        judge_photos(j->photos, j->train_set.count, j->model ? ssdgs_model_settings(j->model) : &j->settings,
+        judge_photos(j->photos, j->count, j->model ? ssdgs_model_settings(j->model) : &j->settings,
                      &j->options, &j->desc.logger))
         return fail("out of memory");
     for (int i = 0; i < j->train_set.count; i++) {
@@ -647,11 +755,14 @@ static int train(job *j) {
     }
     if (!j->given[RESUME] && check_checkpoint(j, error)) return fail(error);
     if ((!j->model && ssdgs_model_create(j->context, &j->settings, 0, &j->model)) ||
-        ssdgs_trainer_create(j->model, j->photos, j->train_set.count, &j->options, &j->trainer))
+        ssdgs_trainer_create(j->model, j->photos, j->count, &j->options, &j->trainer))
         return fail_of(j);
     fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s\n", j->dataset, j->train_set.count, width,
             height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)));
-    if (j->given[RESUME] && ssdgs_trainer_load(j->trainer, j->checkpoint)) return fail_of(j);
+    j->progress.best_at = -1;
+    if (j->given[RESUME] &&
+        (ssdgs_trainer_load(j->trainer, j->checkpoint) || (j->given[KEEP_BEST] && judge_kept(j))))
+        return fail_of(j);
 
     if (j->given[VIEW] && watch(j, error)) return fail(error);
     j->progress.iterations = j->options.iterations;
@@ -660,6 +771,10 @@ static int train(job *j) {
     j->progress.first = -1;
     signal(SIGINT, on_interrupt);
     while ((result = ssdgs_trainer_run(j->trainer, progress, &j->progress)) == SSDGS_ERR_CANCELLED) {
+        if (j->given[KEEP_BEST] && is_due(&j->progress, j->progress.judge_every, j->progress.done) &&
+            judge(j))
+            return fail(ssdgs_error_message(j->context));
+        if (!interrupted && !is_due(&j->progress, j->progress.checkpoint_every, j->progress.done)) continue;
         if (j->progress.done < j->progress.kept) {
             if (!interrupted) continue;
             fprintf(stderr,
@@ -677,25 +792,24 @@ static int train(job *j) {
     signal(SIGINT, SIG_DFL);
     view_close(&j->view);
     if (result) return fail_of(j);
-    if (ssdgs_model_save(j->model, output)) {
-        fail(ssdgs_error_message(j->context));
-        if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
+    const int saved = !(j->given[KEEP_BEST] ? judge(j) : ssdgs_model_save(j->model, output));
+    if (!saved) fail(ssdgs_error_message(j->context));
+    if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
+    if (!saved)
         return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint),
                fail(error);
-    }
     char text[32];
-    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_peek(j->model).count,
-           clock_text(olat_seconds() - start, text));
-    print_peak_memory();
-    printf("\n");
     if (refines && save_refined(j, error)) return fail(error);
-    if (j->options.refine & SSDGS_REFINE_AMBIENT) tell_ambient(ssdgs_model_settings(j->model));
-
     ssdgs_trainer_destroy(j->trainer); /* what is tested is what the file holds */
     ssdgs_model_destroy(j->model);
     j->trainer = NULL;
     j->model = NULL;
     if (ssdgs_model_load(j->context, output, &j->model, NULL)) return fail(ssdgs_error_message(j->context));
+    printf("%s: %d Gaussians, trained in %s", output, ssdgs_model_peek(j->model).count,
+           clock_text(olat_seconds() - start, text));
+    print_peak_memory();
+    printf("\n");
+    if (j->options.refine & SSDGS_REFINE_AMBIENT) tell_ambient(ssdgs_model_settings(j->model));
     if (!has_test) return 0;
     j->test_photos = olat_photos(&j->test_set);
     if (!j->test_photos) return fail("out of memory");
@@ -703,8 +817,7 @@ static int train(job *j) {
     if (!result && refines)
         result = evaluate(j, j->test_photos, j->test_set.count, 1, 200,
                           "test (each photograph's pose and light fitted to it)");
-    if (!result)
-        result = evaluate(j, j->photos, j->train_set.count, (j->train_set.count + 39) / 40, 0, "training");
+    if (!result) result = evaluate(j, j->photos, j->count, (j->count + 39) / 40, 0, "training");
     if (!result) return 0;
     return fail(result == SSDGS_ERR_MEMORY ? "out of memory" : ssdgs_error_message(j->context));
 }

@@ -154,13 +154,26 @@ cp "$out/kept.json" "$set/transforms_test.json"
 rm -f "$set/test/R_000.png" "$set/test/r_000_depth.png"
 check "the dataset is as it was" unchanged
 
-# a checkpoint that is further stays
-kept=$(hash_of "$model.ckpt")
-check "a shorter run" says 1 "holds a run of 30 iterations, and this one of 20 would replace it" train --iterations 20
-check "its checkpoint stays" test "$(hash_of "$model.ckpt")" = "$kept"
-check "a longer run" says 0 "^test: PSNR" train --iterations 35 --checkpoint-every 12
-check "does not replace it where it is behind" test "$(hash_of "$model.ckpt")" = "$kept"
-check "as long a run" says 0 "^test: PSNR" train --iterations 30
+# a checkpoint of a run that was stopped further on stays, one of a run that ended is replaced with its model
+further() { "$build/train" "$set" -o "$out/further.ply" --points 100 "$@"; }
+"$build/train" "$set" -o "$out/further.ply" --points 100 --iterations 100000 --checkpoint-every 30 >/dev/null 2>&1 &
+runner=$!
+for second in $(seq 60); do [ ! -s "$out/further.ply.ckpt" ] || break; sleep 1; done
+kill -INT $runner
+wait $runner
+kept=$(hash_of "$out/further.ply.ckpt")
+check "a shorter run" says 1 "holds a run of [0-9]* iterations, and this one of 20 would replace it" further --iterations 20
+check "its checkpoint stays" test "$(hash_of "$out/further.ply.ckpt")" = "$kept"
+again() { train -o "$out/again.ply" "$@"; }
+check "a run" says 0 "^test: PSNR" again --iterations 25
+check "a shorter one in its place" says 0 "^test: PSNR" again --iterations 20
+check "goes on longer, and tells" says 0 "note: .*again.ply.ckpt: iterations was 20 in its run and is 30 now" again --iterations 30 --resume
+check "holds photographs out" says 0 "held out: PSNR [0-9.]* after 2 iterations, kept" again --keep-best
+check "the last score is told" grep -q "held out: PSNR [0-9.]* after 40 iterations" "$out/log"
+check "it goes on with those" says 0 "held out: PSNR [0-9.]* after 44 iterations" again --keep-best --iterations 44 --resume
+check "others are not those of its run" says 1 "its run had 11 photographs, this one has 12" again --resume
+check "smaller photographs" says 0 "tiny: 12 photographs of 42x42" again --downscale 3
+check "none are left" says 1 "too few to be made 129 times smaller" again --downscale 129
 ln -s "$out/target.ply" "$out/dangling.ply"
 check "a link to nothing" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/dangling.ply" --iterations 1 --points 100
 check "its target is not made" test ! -e "$out/target.ply"
@@ -172,7 +185,7 @@ cp "$set/$(sed -n 's|.*"file_path": "\./\(.*\)",|\1.png|p' "$set/transforms_trai
 check "with a photograph changed" says 1 "photograph 2 has other pixels than in its run: .*(photograph 2 is $set/\(\./\)\?$file)" train --checkpoint-every 30 --resume
 cp "$out/kept.png" "$set/$file"
 check "--resume" says 0 "^test: PSNR" train --checkpoint-every 30 --resume
-check "many iterations" says 1 "note: 3601 iterations are many for 12 photographs: .* Try --iterations 1200" train -o "$out/none.ply" --iterations 3601 --resume
+check "many iterations" says 1 "note: 3601 iterations are many for 12 photographs: .* Try --keep-best, --iterations 1200" train -o "$out/none.ply" --iterations 3601 --resume
 check "not too many" says 1 "none.ply.ckpt: cannot be opened" train -o "$out/none.ply" --iterations 3600 --resume
 check "which are not told" lacks "iterations are many"
 echo "somebody's notes" >"$out/notes.ply.ckpt"

@@ -114,10 +114,6 @@ static void scene(double x, double y, double v[4]) {
     v[3] = 0.6 + 0.35 * cos(3 * x - 4 * y);
 }
 
-static size_t bytes_of(ssdgs_pixels format) {
-    return format == SSDGS_PIXELS_RGBA8 ? 1 : format == SSDGS_PIXELS_RGBA32F ? 4 : 2;
-}
-
 static void store(void *pixels, ssdgs_pixels format, size_t i, double light, int is_alpha) {
     const double coded = is_alpha ? light : olat__to_srgb(light);
     if (format == SSDGS_PIXELS_RGBA32F) ((float *)pixels)[i] = (float)light;
@@ -133,7 +129,7 @@ static double light_of(const void *pixels, ssdgs_pixels format, size_t i, int is
 
 /* What the lens makes of the scene: each pixel's ray by steps back through it. */
 static void *photograph(const olat_lens *l, ssdgs_pixels format) {
-    void *pixels = calloc(4 * W * H, bytes_of(format));
+    void *pixels = calloc(4 * W * H, olat__number_size(format));
     for (int i = 0; i < W * H && pixels; i++) {
         const double to[2] = {i % W + 0.5, i / W + 0.5};
         double ray[2] = {(to[0] - l->centre[0]) / l->focal[0], (to[1] - l->centre[1]) / l->focal[1]}, v[4],
