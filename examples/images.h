@@ -2140,12 +2140,10 @@ static int olat__jpeg_file(const char *name, const unsigned char *bytes, size_t 
         olat__srgb_space(&space), olat__tell(found, OLAT__NAMED, OLAT__UNUSABLE, "an ICC profile", problem);
     if (!failed) failed = olat__to_photo(name, &space, image, found, error);
     free(joined);
-    olat__tell_turned(found, "EXIF's orientation", j.exif, j.exif_size);
+    olat__tell_turned(found, "EXIF's orientation", j.exif.data, j.exif.size);
     if (j.density[0] && j.density[1] && fabs((double)j.density[0] / j.density[1] - 1) > 0.01)
         olat__tell(found, OLAT__NAMED, OLAT__OBLONG("JFIF density %d x %d"), j.density[0], j.density[1]);
-    if (j.extra)
-        olat__tell(found, OLAT__NAMED, "of %lu bytes more than its pixels are made of: it may be damaged",
-                   (unsigned long)j.extra);
+    if (j.padded) olat__tell(found, OLAT__NAMED, "padded where no padding belongs: it may be damaged");
     return failed;
 }
 

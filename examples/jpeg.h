@@ -44,13 +44,11 @@ typedef struct olat__jpeg_code {
 } olat__jpeg_code;
 
 typedef struct olat__jpeg_part { /* a component */
-    int id, h, v;                /* samples of each in the smallest rectangle that has whole ones of all */
-    int quantizer_of, dc, ac;    /* which tables */
+    int id, h, v, quantizer_of;  /* samples in the smallest rectangle that has whole ones of all */
+    int dc, ac, last;            /* the scan's codes; the DC coefficient before */
     int width, height;           /* in samples */
     int columns, rows;           /* blocks in memory, which fill those rectangles */
-    int last;                    /* the DC coefficient before */
-    unsigned char known[64];     /* of each coefficient in the order of the file: 1 + the lowest bit that
-                                    was read; 0: none */
+    unsigned char known[64];     /* of each coefficient in the file's order: 1 + the lowest bit; 0: nothing */
     uint16_t quantizer[64];
     int16_t *blocks; /* of a progressive picture: 64 coefficients each, in rows */
     unsigned char *samples;
@@ -62,24 +60,21 @@ typedef struct olat__jpeg {
     uint64_t bits; /* read but not consumed, highest first, zeros below */
     int count;
     const char *problem; /* the first one; readers then return harmless values and the loops end */
-    int width, height, parts, progressive, is_jfif, adobe, interval, h, v; /* h, v: the most of any part */
+    int width, height, parts, progressive, h, v; /* h, v: the most of any part */
     olat__jpeg_part part[3];
     olat__jpeg_code code[2][4]; /* DC, AC */
     uint16_t quantizer[4][64];
-    int quantizers; /* bit k: the k-th is given */
-    int first, end, high, low, run,
-        number;                /* the scan: coefficients, bits; blocks that end early; restarts */
+    int first, end, high, low; /* the scan's coefficients and bits */
+    int run, interval;         /* blocks that have no more of it; rectangles between restarts */
     uint64_t visited;          /* blocks, in all scans */
     unsigned char *out;        /* (height, width, 4) */
-    size_t extra;              /* bytes that belong to nothing */
-    const unsigned char *exif; /* its TIFF; NULL: there is none */
-    size_t exif_size;
-    int density[2];
+    /* what is told */
+    int is_jfif, density[2], adobe, profile_parts, profile_damaged;
+    int padded; /* bytes belong to nothing */
     struct {
         const unsigned char *data;
         size_t size;
-    } profile[256]; /* parts of an ICC profile, from 1 on */
-    int profile_parts, profile_damaged;
+    } exif, profile[256]; /* a TIFF, NULL: there is none; parts of an ICC profile, from 1 on */
 } olat__jpeg;
 
 static int olat__jpeg_bad(olat__jpeg *j, const char *problem) {
@@ -174,8 +169,8 @@ static void olat__jpeg_coefficients(olat__jpeg *j, olat__jpeg_part *part, int16_
     int k = j->first;
     if (k == 0 && j->high) block[0] = (int16_t)(block[0] | unit * olat__jpeg_take(j, 1));
     else if (k == 0) {
-        part->last += olat__jpeg_number(j, olat__jpeg_symbol(j, &j->code[0][part->dc]));
-        part->last = (int16_t)part->last;
+        const int step = olat__jpeg_number(j, olat__jpeg_symbol(j, &j->code[0][part->dc]));
+        part->last = (int16_t)(part->last + step);
         block[0] = (int16_t)(part->last * unit);
     }
     for (k += k == 0; k < j->end && !j->run && !j->problem; k++) {
@@ -215,6 +210,7 @@ static void olat__jpeg_cosines(const int in[8], int out[8]) {
 }
 
 static int olat__jpeg_clamp(int v, int low, int high) { return v < low ? low : v > high ? high : v; }
+static unsigned char olat__jpeg_byte(int v) { return (unsigned char)olat__jpeg_clamp(v, 0, 255); }
 
 /* Makes samples of a block: columns, rounded to a quarter, then rows. */
 static void olat__jpeg_transform(const int16_t *block, const uint16_t *quantizer, unsigned char *samples,
@@ -233,44 +229,34 @@ static void olat__jpeg_transform(const int16_t *block, const uint16_t *quantizer
     for (int y = 0; y < 8; y++) {
         olat__jpeg_cosines(half + 8 * y, out);
         for (int x = 0; x < 8; x++) /* 128 is the middle */
-            samples[(size_t)y * pitch + (size_t)x] =
-                (unsigned char)olat__jpeg_clamp((out[x] + (257 << 17)) >> 18, 0, 255);
+            samples[(size_t)y * pitch + (size_t)x] = olat__jpeg_byte((out[x] + (257 << 17)) >> 18);
     }
 }
 
 static void olat__jpeg_samples(const olat__jpeg_part *part, int x, int y, const int16_t *block) {
-    const size_t pitch = 8 * (size_t)part->columns;
-    olat__jpeg_transform(block, part->quantizer, part->samples + 8 * (size_t)y * pitch + 8 * (size_t)x,
-                         pitch);
+    const size_t pitch = 8 * (size_t)part->columns, at = 8 * (size_t)y * pitch + 8 * (size_t)x;
+    olat__jpeg_transform(block, part->quantizer, part->samples + at, pitch);
 }
 
-static void olat__jpeg_block(olat__jpeg *j, olat__jpeg_part *part, int x, int y) {
-    int16_t own[64];
-    if (part->blocks)
-        olat__jpeg_coefficients(j, part, part->blocks + 64 * ((size_t)y * (size_t)part->columns + (size_t)x));
-    else {
-        memset(own, 0, sizeof own);
-        olat__jpeg_coefficients(j, part, own);
-        olat__jpeg_samples(part, x, y, own);
-    }
+static int16_t *olat__jpeg_block(const olat__jpeg_part *part, int x, int y) {
+    return part->blocks + 64 * ((size_t)y * (size_t)part->columns + (size_t)x);
 }
 
 /* ==== scans ==== */
 
-/* The next marker's code, with j->at where it is; 0: there is none. Bytes between that are none of its 255
-   are counted. */
+/* The next marker's code, with j->at where it is; 0: there is none. Bytes before it may be 255. */
 static int olat__jpeg_marker(olat__jpeg *j) {
     for (; j->at + 1 < j->size; j->at++) {
         const unsigned char *p = j->bytes + j->at;
         if (p[0] == 255 && p[1] != 0 && p[1] != 255) return p[1];
-        j->extra += p[0] != 255 || p[1] == 0;
+        j->padded |= p[0] != 255 || p[1] == 0;
     }
     return 0;
 }
 
-/* Whole bytes that are left belong to nothing; the last one's other bits mean nothing. */
+/* Bits up to a whole byte mean nothing. */
 static void olat__jpeg_restart(olat__jpeg *j) {
-    j->extra += (size_t)(j->count / 8);
+    j->padded |= j->count > 7;
     j->bits = 0;
     j->count = j->run = 0;
     for (int i = 0; i < j->parts; i++) j->part[i].last = 0;
@@ -279,28 +265,30 @@ static void olat__jpeg_restart(olat__jpeg *j) {
 /* Reads the data of a scan: of one part its own blocks in rows, of several rectangles with blocks of each
    (T.81, A.2). */
 static void olat__jpeg_data(olat__jpeg *j, olat__jpeg_part *const *scanned, int count) {
-    const olat__jpeg_part *alone = count == 1 ? scanned[0] : NULL;
-    const int across = alone ? (alone->width + 7) / 8 : j->part->columns / j->part->h,
-              down = alone ? (alone->height + 7) / 8 : j->part->rows / j->part->v;
-    int left = j->interval;
+    const olat__jpeg_part *part = scanned[0];
+    const int alone = count == 1, across = alone ? (part->width + 7) / 8 : part->columns / part->h,
+              down = alone ? (part->height + 7) / 8 : part->rows / part->v;
+    int16_t block[64];
     olat__jpeg_restart(j);
-    j->number = 0;
-    for (int y = 0; y < down; y++)
-        for (int x = 0; x < across; x++) {
-            if (j->interval && left-- == 0) {
-                olat__jpeg_restart(j);
-                if (olat__jpeg_marker(j) != 0xD0 + j->number) olat__jpeg_bad(j, "a restart is missing");
-                else j->at += 2;
-                j->number = (j->number + 1) & 7;
-                left = j->interval - 1;
-            }
-            for (int i = 0; i < count; i++) {
-                const int h = alone ? 1 : scanned[i]->h, v = alone ? 1 : scanned[i]->v;
-                for (int k = 0; k < h * v && !j->problem; k++)
-                    olat__jpeg_block(j, scanned[i], x * h + k % h, y * v + k / h);
-            }
-            if (j->problem) return;
+    for (int i = 0; i < across * down; i++) {
+        const int restart = j->interval && i && i % j->interval == 0 ? 0xD0 + (i / j->interval - 1) % 8 : 0;
+        if (restart) {
+            olat__jpeg_restart(j);
+            if (olat__jpeg_marker(j) == restart) j->at += 2;
+            else olat__jpeg_bad(j, "a restart is missing");
         }
+        for (int n = 0; n < count; n++) {
+            const int h = alone ? 1 : scanned[n]->h, v = alone ? 1 : scanned[n]->v;
+            for (int k = 0; k < h * v; k++) {
+                const int x = i % across * h + k % h, y = i / across * v + k / h;
+                if (j->problem) return;
+                if (!j->progressive) memset(block, 0, sizeof block);
+                olat__jpeg_coefficients(j, scanned[n],
+                                        j->progressive ? olat__jpeg_block(scanned[n], x, y) : block);
+                if (!j->progressive) olat__jpeg_samples(scanned[n], x, y, block);
+            }
+        }
+    }
     olat__jpeg_restart(j);
 }
 
@@ -328,9 +316,9 @@ static const char *olat__jpeg_scan(olat__jpeg *j, const unsigned char *p, size_t
         if (part->dc > 3 || part->ac > 3 || (!j->first && !j->high && !j->code[0][part->dc].given) ||
             (j->end > 1 && !j->code[1][part->ac].given))
             return "a Huffman table is missing";
-        if (!(j->quantizers >> part->quantizer_of & 1)) return "a quantization table is missing";
         if (!part->quantizer[0])
             memcpy(part->quantizer, j->quantizer[part->quantizer_of], sizeof part->quantizer);
+        if (!part->quantizer[0]) return "a quantization table is missing";
         for (int k = j->first; k < j->end; k++) {
             if (part->known[k] != (j->high ? j->high + 1 : 0)) return "a scan out of turn";
             part->known[k] = (unsigned char)(j->low + 1);
@@ -374,8 +362,6 @@ static const unsigned char *olat__jpeg_row(const olat__jpeg *j, const olat__jpeg
     return out;
 }
 
-static unsigned char olat__jpeg_byte(int v) { return (unsigned char)(v < 0 ? 0 : v > 255 ? 255 : v); }
-
 /* Makes pixels of a row; colours by ITU-T T.871, in 2^-16. */
 static void olat__jpeg_pixels(const unsigned char *const row[3], int is_rgb, int width, unsigned char *out) {
     const unsigned char *first = row[0], *second = row[1], *third = row[2];
@@ -388,23 +374,15 @@ static void olat__jpeg_pixels(const unsigned char *const row[3], int is_rgb, int
     }
 }
 
-/* JFIF has YCbCr; Adobe's marker says which; else the components' names do. */
-static int olat__jpeg_is_rgb(const olat__jpeg *j) {
-    const olat__jpeg_part *part = j->part;
-    if (j->parts == 1) return 1;
-    if (j->is_jfif || j->adobe) return !j->is_jfif && j->adobe == 1;
-    return part[0].id == 'R' && part[1].id == 'G' && part[2].id == 'B';
-}
-
 static const char *olat__jpeg_finish(olat__jpeg *j) {
-    if (!j->parts) return "there is no frame header";
-    for (int i = 0; i < j->parts; i++) {
-        const olat__jpeg_part *part = j->part + i;
+    const olat__jpeg_part *part = j->part;
+    const int names_rgb = part[0].id == 'R' && part[1].id == 'G' && part[2].id == 'B',
+              is_rgb = j->parts == 1 || (!j->is_jfif && (j->adobe ? j->adobe == 1 : names_rgb));
+    for (int i = 0; i < j->parts; i++, part++) {
         if (!part->known[0]) return "a component has no scan";
-        for (int y = 0; y < (part->height + 7) / 8 && part->blocks; y++)
+        for (int y = 0; y < (part->height + 7) / 8 && j->progressive; y++)
             for (int x = 0; x < (part->width + 7) / 8; x++)
-                olat__jpeg_samples(part, x, y,
-                                   part->blocks + 64 * ((size_t)y * (size_t)part->columns + (size_t)x));
+                olat__jpeg_samples(part, x, y, olat__jpeg_block(part, x, y));
     }
     const size_t width = (size_t)j->width;
     j->out = (unsigned char *)malloc(4 * width * (size_t)j->height);
@@ -416,7 +394,7 @@ static const char *olat__jpeg_finish(olat__jpeg *j) {
         for (int i = 0; i < 3; i++)
             row[i] = i < j->parts ? olat__jpeg_row(j, j->part + i, y, sums, rows + (size_t)i * (width + 1))
                                   : row[0];
-        olat__jpeg_pixels(row, olat__jpeg_is_rgb(j), j->width, j->out + 4 * width * (size_t)y);
+        olat__jpeg_pixels(row, is_rgb, j->width, j->out + 4 * width * (size_t)y);
     }
     free(sums);
     free(rows);
@@ -427,10 +405,10 @@ static const char *olat__jpeg_finish(olat__jpeg *j) {
 
 static const char *olat__jpeg_frame(olat__jpeg *j, int marker, const unsigned char *p, size_t size) {
     if (j->parts) return "a second frame header";
-    if (marker == 0xC3) return "lossless JPEG cannot be read: convert it to PNG";
-    if (marker > 0xC8 && marker != 0xCD && marker != 0xCE && marker != 0xCF)
+    if (marker == 0xDE || (marker > 0xC2 && marker < 0xC8))
+        return "lossless and hierarchical JPEG cannot be read: convert it to PNG";
+    if (marker > 0xC8)
         return "arithmetic codes cannot be read: repack, for instance with: jpegtran in.jpg >out.jpg";
-    if (marker > 0xC2) return "hierarchical JPEG cannot be read: convert it to PNG";
     if (size < 6 || size != 6 + 3 * (size_t)p[5]) return "a frame header of a bad length";
     if (p[0] != 8) return "samples of other than 8 bits cannot be read: convert it to PNG";
     if (!p[1] && !p[2])
@@ -439,15 +417,11 @@ static const char *olat__jpeg_frame(olat__jpeg *j, int marker, const unsigned ch
         return "CMYK cannot be read: convert it to RGB, for instance with: convert in.jpg -colorspace "
                "sRGB out.png";
     if (p[5] != 1 && p[5] != 3) return "neither grey nor of three components";
-    const uint32_t height = (uint32_t)(p[1] << 8 | p[2]), width = (uint32_t)(p[3] << 8 | p[4]);
-    const char *problem = olat__size_problem(width, height);
-    size_t blocks = 0;
+    const int height = p[1] << 8 | p[2], width = p[3] << 8 | p[4];
+    const char *problem = olat__size_problem((uint32_t)width, (uint32_t)height);
     if (problem) return problem;
-    j->progressive = marker == 0xC2;
-    j->width = (int)width;
-    j->height = (int)height;
-    j->parts = p[5];
-    for (int i = 0; i < j->parts; i++) {
+    size_t blocks = 0;
+    for (int i = 0; i < p[5]; i++) {
         olat__jpeg_part *part = j->part + i;
         const unsigned char *told = p + 6 + 3 * i;
         part->id = told[0];
@@ -461,19 +435,20 @@ static const char *olat__jpeg_frame(olat__jpeg *j, int marker, const unsigned ch
         if (part->h > j->h) j->h = part->h;
         if (part->v > j->v) j->v = part->v;
     }
-    const int columns = (j->width + 8 * j->h - 1) / (8 * j->h),
-              rows = (j->height + 8 * j->v - 1) / (8 * j->v);
-    for (int i = 0; i < j->parts; i++) {
-        olat__jpeg_part *part = j->part + i;
+    for (; j->parts < p[5]; j->parts++) {
+        olat__jpeg_part *part = j->part + j->parts;
         if (j->h % part->h || j->v % part->v)
             return "samplings that do not divide the finest cannot be read: convert it to PNG";
-        part->width = (j->width * part->h + j->h - 1) / j->h;
-        part->height = (j->height * part->v + j->v - 1) / j->v;
-        part->columns = columns * part->h;
-        part->rows = rows * part->v;
+        part->width = (width * part->h + j->h - 1) / j->h;
+        part->height = (height * part->v + j->v - 1) / j->v;
+        part->columns = (width + 8 * j->h - 1) / (8 * j->h) * part->h;
+        part->rows = (height + 8 * j->v - 1) / (8 * j->v) * part->v;
         blocks += (size_t)((part->width + 7) / 8) * (size_t)((part->height + 7) / 8);
     }
     if (blocks / 8 > j->size) return "less data than are needed"; /* a bit each at least */
+    j->progressive = marker == 0xC2;
+    j->width = width;
+    j->height = height;
     for (int i = 0; i < j->parts; i++) {
         olat__jpeg_part *part = j->part + i;
         const size_t count = 64 * (size_t)part->columns * (size_t)part->rows;
@@ -507,7 +482,6 @@ static const char *olat__jpeg_quantizers(olat__jpeg *j, const unsigned char *p, 
             if (!step) return "a quantization step of 0";
             j->quantizer[k][olat__jpeg_order[i]] = (uint16_t)step;
         }
-        j->quantizers |= 1 << k;
         p += used;
         size -= used;
     }
@@ -523,9 +497,9 @@ static void olat__jpeg_told(olat__jpeg *j, int marker, const unsigned char *p, s
     if (marker == 0xE0 && olat__jpeg_begins(p, size, "JFIF", 5) && size >= 14) {
         j->is_jfif = 1;
         for (int i = 0; i < 2; i++) j->density[i] = p[8 + 2 * i] << 8 | p[9 + 2 * i];
-    } else if (marker == 0xE1 && olat__jpeg_begins(p, size, "Exif\0", 6) && !j->exif) {
-        j->exif = p + 6;
-        j->exif_size = size - 6;
+    } else if (marker == 0xE1 && olat__jpeg_begins(p, size, "Exif\0", 6) && !j->exif.data) {
+        j->exif.data = p + 6;
+        j->exif.size = size - 6;
     } else if (marker == 0xE2 && olat__jpeg_begins(p, size, "ICC_PROFILE", 12)) {
         const int number = size > 14 ? p[12] : 0;
         if (!number || number > p[13] || (j->profile_parts && j->profile_parts != p[13]) ||
@@ -537,35 +511,33 @@ static void olat__jpeg_told(olat__jpeg *j, int marker, const unsigned char *p, s
 
 /* Leaves the pixels in j->out; returns NULL or what is wrong. */
 static const char *olat__jpeg_read(olat__jpeg *j) {
-    for (j->at = 2;;) {
+    const char *problem = NULL;
+    for (j->at = 2; !problem;) {
         const int marker = olat__jpeg_marker(j);
-        const unsigned char *p = j->bytes + j->at + 2;
-        const char *problem = NULL;
-        if (!marker) return "the file ends early";
-        if (marker == 0xD9) return olat__jpeg_finish(j);
+        const size_t left = j->size - j->at;
+        if (marker == 0xD9) return j->parts ? olat__jpeg_finish(j) : "the picture is missing";
         if (marker == 1 || (marker >= 0xD0 && marker <= 0xD7)) { /* those have no segment */
             j->at += 2;
             continue;
         }
-        if (marker < 0xC0 || marker == 0xD8) return "an unknown marker";
-        const size_t left = j->size - j->at - 2, size = left < 2 ? 2 : (size_t)(p[0] << 8 | p[1]);
-        if (left < 2 || size > left) return "the file ends early";
-        if (size < 2) return "a segment that is shorter than its length";
-        const size_t after = j->at + 2 + size;
-        if (marker == 0xC4) problem = olat__jpeg_huffman(j, p + 2, size - 2);
-        else if (marker == 0xDB) problem = olat__jpeg_quantizers(j, p + 2, size - 2);
-        else if (marker == 0xDD) {
-            if (size != 4) problem = "a restart interval of a bad length";
-            else j->interval = p[2] << 8 | p[3];
-        } else if (marker == 0xDE) problem = "hierarchical JPEG cannot be read: convert it to PNG";
-        else if (marker == 0xDA) {
-            if ((problem = olat__jpeg_scan(j, p + 2, size - 2)) == NULL) continue;
-        } else if (marker <= 0xCF && marker != 0xC8 && marker != 0xCC)
-            problem = olat__jpeg_frame(j, marker, p + 2, size - 2);
-        else olat__jpeg_told(j, marker, p + 2, size - 2);
-        if (problem) return problem;
-        j->at = after;
+        const unsigned char *p = j->bytes + j->at;
+        const size_t length = !marker || left < 4 ? left : (size_t)(p[2] << 8 | p[3]);
+        if (length > left - 2) return "the file ends early";
+        if (length < 2) return "a segment that is shorter than its length";
+        const size_t size = length - 2, after = j->at + 2 + length;
+        p += 4;
+        if (marker < 0xC0 || marker == 0xD8) problem = "an unknown marker";
+        else if (marker == 0xC4) problem = olat__jpeg_huffman(j, p, size);
+        else if (marker == 0xDB) problem = olat__jpeg_quantizers(j, p, size);
+        else if (marker == 0xDA) problem = olat__jpeg_scan(j, p, size);
+        else if (marker == 0xDD && size != 2) problem = "a restart interval of a bad length";
+        else if (marker == 0xDD) j->interval = p[0] << 8 | p[1];
+        else if (marker == 0xDE || (marker < 0xD0 && marker != 0xC8 && marker != 0xCC))
+            problem = olat__jpeg_frame(j, marker, p, size);
+        else olat__jpeg_told(j, marker, p, size);
+        if (!problem && marker != 0xDA) j->at = after;
     }
+    return problem;
 }
 
 /* Decodes a JPEG; j is empty, and is so again after a failure. */
