@@ -1,4 +1,4 @@
-/* images.h - reads PNG and OpenEXR, writes PNG, animated too. MIT, see ssdgs.h.
+/* images.h - reads PNG, JPEG and OpenEXR, writes PNG, animated too. MIT, see ssdgs.h.
 
    #include "ssdgs.h"
    #include "images.h"
@@ -11,17 +11,18 @@
    else sRGB, else gAMA and cHRM say is converted to that, PQ and HLG to light in halves. OpenEXR, scan lines
    or tiles, unpacked, RLE, ZIPS, ZIP, PIZ or PXR24, halves or floats: the display window, alpha divided out,
    in sRGB's primaries; R G B A of the layer or part named Combined, else of the one without a name, else of
-   rgba or beauty, of one with alpha, of any; where there is none, Y; of the default view. olat__image_file
-   does all that and tells what is to be noted; olat_read_png gives a PNG's numbers as they are stored.
+   rgba or beauty, of one with alpha, of any; where there is none, Y; of the default view. JPEG as jpeg.h has
+   it, sRGB or by its ICC profile. olat__image_file does all that and tells what is to be noted; olat_read_png
+   gives a PNG's numbers as they are stored.
 
    CONTENTS  inflate and deflate; what is to be noted of files; primaries; PNG; OpenEXR; what numbers stand
-   for, curves and profiles, either kind of file as a photograph or a mask.
+   for, curves and profiles, each kind of file as a photograph or a mask.
 
    ERRORS  Functions return 0, or 1 and one message that names the file and the byte. Nothing is kept.
 
    MEMORY  Pixels are the caller's to free. Beside them reading a PNG takes its file twice and its samples,
-   OpenEXR its file and four ssdgs_real a pixel; writing takes a little more than two pictures. All that is
-   freed before the end.
+   OpenEXR its file and four ssdgs_real a pixel, JPEG its file and what jpeg.h says; writing takes a little
+   more than two pictures. All that is freed before the end.
 
    HOSTILE  Every byte of a file may be wrong. */
 

@@ -51,7 +51,7 @@ static const char *const help[] = {
     "  --trajectory             renders the paper's path instead: light and camera turn round the object",
     "  --animation FILE.png     the light's first round on that path, as one animated PNG",
     "  --size PIXELS            width of the path's pictures; that of the photographs",
-    "  --sky MAP                an environment map, OpenEXR or PNG, lights all frames in place of lamps and",
+    "  --sky MAP                an environment map, OpenEXR, PNG or JPEG, lights all frames in place of lamps and",
     "                           room: 16 lights and ambient light; its rows lie round the upward axis",
     "  --ambient FACTOR         of the light from the room that the model's photographs had; 1, 0 leaves",
     "                           it out",

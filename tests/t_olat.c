@@ -1982,8 +1982,7 @@ static void test_kinds_of_image(void) {
         const char *bytes;
         size_t size;
         const char *message;
-    } files[] = {{"\xFF\xD8\xFF\xE0\0\x10JFIF", 10, "byte 0: this is a JPEG file"},
-                 {"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
+    } files[] = {{"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
                  {"GIF89a\1\2", 8, "a GIF file"},
                  {"II*\0\1\2", 6, "a TIFF file"},
                  {"MM\0*\1\2", 6, "a TIFF file"},
@@ -2028,6 +2027,12 @@ static void test_kinds_of_image(void) {
         CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0, files[i].message) &&
               strstr(error, "odd.png: byte 0: "));
     }
+    memcpy(file, "\xFF\xD8\xFF\xE0\0\x10JFIF",
+           file_size = 10); /* what is called .png may be JPEG, not for olat_read_png */
+    CHECK(refused_with("byte 0: this is a JPEG file, not a PNG file: convert it to PNG"));
+    write_bytes(FOLDER "/odd.png");
+    CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0,
+                     "odd.png: byte 2: the file ends early"));
     CHECK(live == 0);
 }
 
