@@ -8,7 +8,7 @@
 static int usage(void) {
     fprintf(
         stderr,
-        "usage: ball X Y RADIUS IMAGE.png [IMAGE.png ...] [--focal PIXELS]\n"
+        "usage: ball X Y RADIUS IMAGE [IMAGE ...] [--focal PIXELS]\n"
         "For photographs of a ball of chrome, its outline a circle round (X, Y) in pixels, prints pl_dir, "
         "the\n"
         "direction to the light: x right, y up, z to the viewer. Turned by the camera's rotation, the first\n"
@@ -88,10 +88,16 @@ int main(int argc, char **argv) {
         void *pixels = NULL;
         double at[2], direction[3];
         const char *problem;
-        const int unread = olat_read_png(argv[i], &width, &height, &format, &pixels, error);
+        olat__found found;
+        memset(&found, 0, sizeof found);
+        const int unread = olat__image_file(argv[i], 0, &width, &height, &format, &pixels, &found, error);
+        for (int r = 0; r < found.count; r++)
+            fprintf(stderr, "ball: note: %s is %s\n", argv[i], found.remarks[r].text);
         unsigned char *bytes = unread ? NULL : (unsigned char *)malloc(4 * (size_t)width * (size_t)height);
-        for (size_t p = 0; bytes && p < 4 * (size_t)width * (size_t)height; p++)
-            bytes[p] = (unsigned char)(255 * olat__number(pixels, format, p) + (ssdgs_real)0.5);
+        for (size_t p = 0; bytes && p < 4 * (size_t)width * (size_t)height; p++) {
+            const ssdgs_real v = olat__number(pixels, format, p);
+            bytes[p] = (unsigned char)(v < 1 ? 255 * v + (ssdgs_real)0.5 : 255);
+        }
         const double centre[2] = {0.5 * width, 0.5 * height};
         problem = unread ? error : !bytes ? "out of memory" : highlight(bytes, width, height, circle, at);
         if (!problem && !reflected(circle, at, focal, centre, direction))

@@ -1,4 +1,4 @@
-/* images.h - reads PNG and OpenEXR, writes PNG, animated too. MIT, see ssdgs.h.
+/* images.h - reads PNG, JPEG and OpenEXR, writes PNG, animated too. MIT, see ssdgs.h.
 
    #include "ssdgs.h"
    #include "images.h"
@@ -11,17 +11,18 @@
    else sRGB, else gAMA and cHRM say is converted to that, PQ and HLG to light in halves. OpenEXR, scan lines
    or tiles, unpacked, RLE, ZIPS, ZIP, PIZ or PXR24, halves or floats: the display window, alpha divided out,
    in sRGB's primaries; R G B A of the layer or part named Combined, else of the one without a name, else of
-   rgba or beauty, of one with alpha, of any; where there is none, Y; of the default view. olat__image_file
-   does all that and tells what is to be noted; olat_read_png gives a PNG's numbers as they are stored.
+   rgba or beauty, of one with alpha, of any; where there is none, Y; of the default view. JPEG as jpeg.h has
+   it, sRGB or by its ICC profile. olat__image_file does all that and tells what is to be noted; olat_read_png
+   gives a PNG's numbers as they are stored.
 
    CONTENTS  inflate and deflate; what is to be noted of files; primaries; PNG; OpenEXR; what numbers stand
-   for, curves and profiles, either kind of file as a photograph or a mask.
+   for, curves and profiles, each kind of file as a photograph or a mask.
 
    ERRORS  Functions return 0, or 1 and one message that names the file and the byte. Nothing is kept.
 
    MEMORY  Pixels are the caller's to free. Beside them reading a PNG takes its file twice and its samples,
-   OpenEXR its file and four ssdgs_real a pixel; writing takes a little more than two pictures. All that is
-   freed before the end.
+   OpenEXR its file and four ssdgs_real a pixel, JPEG its file and what jpeg.h says; writing takes a little
+   more than two pictures. All that is freed before the end.
 
    HOSTILE  Every byte of a file may be wrong. */
 
@@ -29,9 +30,8 @@
 #define OLAT_IMAGES_H
 
 #include "files.h"
+#include "jpeg.h"
 #include <math.h>
-
-enum { OLAT__MAX_SIDE = 1 << 15, OLAT__MAX_PIXELS = 1 << 28 };
 
 /* ==== inflate and deflate, RFC 1950 and 1951 ==== */
 
@@ -353,6 +353,9 @@ enum { OLAT__NAMED = 1, OLAT__OF_MASK = 2, OLAT__REMARKS = 8 };
 #define OLAT__TURNED \
     "to be turned or mirrored for viewing (%s %d): read as stored, so cameras must be those of the stored " \
     "picture"
+#define OLAT__UNUSABLE \
+    "marked with %s that cannot be used (%s): read without; export as sRGB, or with a profile of a matrix " \
+    "and curves"
 typedef struct olat__remark {
     int flags; /* OLAT__NAMED: the files' names belong to it; OLAT__OF_MASK: it is about masks */
     char text[240];
@@ -521,9 +524,8 @@ static const char *olat__png_header(olat__png *png, const unsigned char *data, s
     const uint32_t width = olat__be32(data);
     const uint32_t height = olat__be32(data + 4);
     while (k < 5 && data[8] != 1 << k) k++;
-    if (width < 1 || height < 1) return "the image has no pixels";
-    if (width > OLAT__MAX_SIDE || height > OLAT__MAX_SIDE) return "a side is longer than 32768 pixels";
-    if (height > OLAT__MAX_PIXELS / width) return "the image has more than 2^28 pixels";
+    const char *problem = olat__size_problem(width, height);
+    if (problem) return problem;
     if (data[9] > 6 || !(depths[data[9]] >> k & 1)) return "unknown combination of colour type and bit depth";
     if (data[10] != 0 || data[11] != 0 || data[12] > 1)
         return "unknown compression, filter or interlace method";
@@ -1745,6 +1747,12 @@ typedef struct olat__space {
     char source[48]; /* who tells it */
 } olat__space;
 
+typedef struct olat__image {
+    int width, height;
+    ssdgs_pixels format;
+    void *pixels; /* (height, width, 4) */
+} olat__image;
+
 static void olat__power(olat__code *code, double g, double a, double b, double c, double d) {
     memset(code, 0, sizeof *code);
     code->g = g, code->a = a, code->b = b, code->c = c, code->d = d;
@@ -1974,11 +1982,7 @@ static int olat__png_space(const char *name, olat__png *png, olat__space *space,
         if (!problem && damaged && (!told || kind == OLAT__GAMA)) problem = "damaged";
         if (problem && !strcmp(problem, "out of memory"))
             return olat__fail(error, "%s: out of memory", olat__tail(name));
-        if (problem)
-            olat__tell(found, OLAT__NAMED,
-                       "marked with %s that cannot be used (%s): read without; export as sRGB, or with a "
-                       "profile of a matrix and curves",
-                       chunks[i].name, problem);
+        if (problem) olat__tell(found, OLAT__NAMED, OLAT__UNUSABLE, chunks[i].name, problem);
         if (problem && kind != OLAT__GAMA) continue;
         if (*space->source && *next.source && olat__space_distance(space, &next) > 0.05)
             olat__tell(found, OLAT__NAMED, "marked in two ways that contradict (%s; %s): the latter is taken",
@@ -1990,9 +1994,9 @@ static int olat__png_space(const char *name, olat__png *png, olat__space *space,
 
 /* Brings colours to the sRGB curve in 16 bits, or to light in halves where some may be brighter than white;
    alpha stays. */
-static int olat__png_convert(olat__png *png, const olat__space *space, olat__found *found) {
-    const size_t pixels = (size_t)png->width * (size_t)png->height;
-    const int wide = png->format == SSDGS_PIXELS_RGBA16, plain = !space->differs && !space->high;
+static int olat__convert(const olat__space *space, olat__image *image, olat__found *found) {
+    const size_t pixels = (size_t)image->width * (size_t)image->height;
+    const int wide = image->format == SSDGS_PIXELS_RGBA16, plain = !space->differs && !space->high;
     const unsigned top = wide ? 65535 : 255;
     const double black = space->narrow ? wide ? 16 * 256 : 16 : 0,
                  range = space->narrow ? wide ? 219 * 256 : 219 : top;
@@ -2009,11 +2013,11 @@ static int olat__png_convert(olat__png *png, const olat__space *space, olat__fou
         if (plain) table[i] = 65535 * olat__to_srgb(table[i]) + 0.5;
     }
     for (size_t i = 0; i < pixels; i++) {
-        const unsigned alpha = olat__sample(png->out, png->format, 4 * i + 3);
+        const unsigned alpha = olat__sample(image->pixels, image->format, 4 * i + 3);
         double stored[3], v[3];
         int odd = 0;
         for (size_t c = 0; c < 3; c++)
-            stored[c] = table[c * (top + 1) + olat__sample(png->out, png->format, 4 * i + c)];
+            stored[c] = table[c * (top + 1) + olat__sample(image->pixels, image->format, 4 * i + c)];
         olat__transform(space->matrix, stored, v);
         for (size_t c = 0; c < 3; c++) {
             if (!plain) {
@@ -2029,9 +2033,9 @@ static int olat__png_convert(olat__png *png, const olat__space *space, olat__fou
     }
     if (outside > pixels / 1000) olat__tell(found, OLAT__NAMED, OLAT__OUTSIDE);
     free(table);
-    free(png->out);
-    png->out = (unsigned char *)out;
-    png->format = space->high ? SSDGS_PIXELS_RGBA16F : SSDGS_PIXELS_RGBA16;
+    free(image->pixels);
+    image->pixels = out;
+    image->format = space->high ? SSDGS_PIXELS_RGBA16F : SSDGS_PIXELS_RGBA16;
     return 0;
 }
 
@@ -2049,33 +2053,55 @@ static int olat__exif_orientation(const unsigned char *p, size_t size) {
     return 1;
 }
 
-/* Makes a decoded PNG's pixels those of a photograph. */
-static int olat__png_photo(const char *name, olat__png *png, olat__found *found, char *error) {
+/* Makes pixels of that space those of a photograph. */
+static int olat__to_photo(const char *name, const olat__space *space, olat__image *image, olat__found *found,
+                          char *error) {
     static const char *const what[4] = {"converted to sRGB", "converted to the sRGB curve",
                                         "read as light, of which 203 nits are 1",
                                         "read as the scene's light, of which 75 % of the signal are 1"};
-    const unsigned char *exif = png->told[OLAT__EXIF].data, *phys = png->told[OLAT__PHYS].data;
-    const int turned = exif ? olat__exif_orientation(exif, png->told[OLAT__EXIF].size) : 1;
-    olat__space space, srgb;
-    png->packed = NULL;
+    const int kind = space->code->kind;
+    int linear = 1;
+    olat__space srgb;
     olat__srgb_space(&srgb);
-    int failed = olat__png_space(name, png, &space, found, error), linear = 1;
-    if (!failed && (space.differs || olat__space_distance(&space, &srgb) > 0.002)) {
-        const int kind = space.code->kind;
-        for (int c = 0; c < 3; c++) linear &= fabs(olat__light(space.code + c, 0.5) - 0.5) < 2e-3;
-        olat__tell(found, 0, "%s (%s): %s",
-                   linear       ? "linear"
-                   : space.high ? "HDR"
-                                : "not sRGB",
-                   space.source,
-                   what[kind == OLAT__HLG  ? 3
-                        : kind == OLAT__PQ ? 2
-                                           : !space.differs]);
-        failed =
-            olat__png_convert(png, &space, found) && olat__fail(error, "%s: out of memory", olat__tail(name));
-    }
-    free(png->packed);
-    if (turned > 1 && turned < 9) olat__tell(found, OLAT__NAMED, OLAT__TURNED, "eXIf orientation", turned);
+    if (!space->differs && olat__space_distance(space, &srgb) <= 0.002) return 0;
+    for (int c = 0; c < 3; c++) linear &= fabs(olat__light(space->code + c, 0.5) - 0.5) < 2e-3;
+    olat__tell(found, 0, "%s (%s): %s",
+               linear        ? "linear"
+               : space->high ? "HDR"
+                             : "not sRGB",
+               space->source,
+               what[kind == OLAT__HLG  ? 3
+                    : kind == OLAT__PQ ? 2
+                                       : !space->differs]);
+    return olat__convert(space, image, found) && olat__fail(error, "%s: out of memory", olat__tail(name));
+}
+
+static void olat__tell_turned(olat__found *found, const char *who, const unsigned char *exif, size_t size) {
+    const int turned = exif ? olat__exif_orientation(exif, size) : 1;
+    if (turned > 1 && turned < 9) olat__tell(found, OLAT__NAMED, OLAT__TURNED, who, turned);
+}
+
+/* A PNG as a photograph, or as a mask. */
+static int olat__png_file(const char *name, const unsigned char *bytes, size_t size, int is_mask,
+                          olat__image *image, olat__found *found, char *error) {
+    olat__png png;
+    olat__space space;
+    memset(&png, 0, sizeof png);
+    png.is_mask = is_mask;
+    int failed = olat__png_decode(name, bytes, size, &png, error);
+    image->width = png.width;
+    image->height = png.height;
+    image->format = png.format;
+    image->pixels = png.out;
+    if (png.labels)
+        olat__tell(found, OLAT__OF_MASK, "of labels, by a palette of colours: all but index 0 is kept");
+    if (failed || is_mask) return failed;
+    png.packed = NULL;
+    failed = olat__png_space(name, &png, &space, found, error) ||
+             olat__to_photo(name, &space, image, found, error);
+    free(png.packed);
+    olat__tell_turned(found, "eXIf orientation", png.told[OLAT__EXIF].data, png.told[OLAT__EXIF].size);
+    const unsigned char *phys = png.told[OLAT__PHYS].data;
     if (phys) {
         const double x = olat__be32(phys), y = olat__be32(phys + 4);
         if (x > 0 && y > 0 && fabs(x / y - 1) > 0.01)
@@ -2084,30 +2110,69 @@ static int olat__png_photo(const char *name, olat__png *png, olat__found *found,
     return failed;
 }
 
-/* Reads a PNG or OpenEXR, as a photograph or as a mask. */
+/* The space of a JPEG's ICC profile, whose parts are joined in *joined, where curves point to. */
+static const char *olat__jpeg_space(const olat__jpeg *j, unsigned char **joined, olat__space *space) {
+    size_t size = 0;
+    for (int i = 1; i <= j->profile_parts; i++) {
+        if (!j->profile[i].data) return "damaged";
+        size += j->profile[i].size;
+    }
+    if (j->profile_damaged) return "damaged";
+    if ((*joined = (unsigned char *)malloc(size + 1)) == NULL) return "out of memory";
+    size = 0;
+    for (int i = 1; i <= j->profile_parts; size += j->profile[i].size, i++)
+        memcpy(*joined + size, j->profile[i].data, j->profile[i].size);
+    return olat__icc_space(*joined, size, space);
+}
+
+/* A JPEG as a photograph, or as a mask. */
+static int olat__jpeg_file(const char *name, const unsigned char *bytes, size_t size, int is_mask,
+                           olat__image *image, olat__found *found, char *error) {
+    olat__jpeg j;
+    olat__space space;
+    unsigned char *joined = NULL;
+    memset(&j, 0, sizeof j);
+    int failed = olat__jpeg_decode(name, bytes, size, &j, error);
+    image->width = j.width;
+    image->height = j.height;
+    image->format = SSDGS_PIXELS_RGBA8;
+    image->pixels = j.out;
+    if (failed || is_mask) return failed;
+    olat__srgb_space(&space);
+    const char *problem = j.profile_parts || j.profile_damaged ? olat__jpeg_space(&j, &joined, &space) : NULL;
+    if (problem && !strcmp(problem, "out of memory"))
+        failed = olat__fail(error, "%s: out of memory", olat__tail(name));
+    else if (problem)
+        olat__srgb_space(&space), olat__tell(found, OLAT__NAMED, OLAT__UNUSABLE, "an ICC profile", problem);
+    if (!failed) failed = olat__to_photo(name, &space, image, found, error);
+    free(joined);
+    olat__tell_turned(found, "EXIF's orientation", j.exif.data, j.exif.size);
+    if (j.density[0] && j.density[1] && fabs((double)j.density[0] / j.density[1] - 1) > 0.01)
+        olat__tell(found, OLAT__NAMED, OLAT__OBLONG("JFIF density %d x %d"), j.density[0], j.density[1]);
+    if (j.padded) olat__tell(found, OLAT__NAMED, "padded where no padding belongs: it may be damaged");
+    return failed;
+}
+
+/* Reads a PNG, JPEG or OpenEXR, as a photograph or as a mask. */
 OLAT__API int olat__image_file(const char *path, int is_mask, int *width, int *height, ssdgs_pixels *format,
                                void **pixels, olat__found *found, char *error) {
     unsigned char *bytes = NULL;
     size_t size = 0;
+    olat__image image;
     const int told = found->count;
-    *pixels = NULL;
+    memset(&image, 0, sizeof image);
     int failed = olat__read_file(path, &bytes, &size, error);
     if (!failed && size >= 4 && olat__le32(bytes) == OLAT__EXR_MAGIC) {
-        failed = olat__exr_decode(path, bytes, size, width, height, format, pixels, found, error);
+        failed = olat__exr_decode(path, bytes, size, &image.width, &image.height, &image.format,
+                                  &image.pixels, found, error);
         if (is_mask) found->count = told;
-    } else if (!failed) {
-        olat__png png;
-        memset(&png, 0, sizeof png);
-        png.is_mask = is_mask;
-        failed = olat__png_decode(path, bytes, size, &png, error);
-        if (!failed && !is_mask) failed = olat__png_photo(path, &png, found, error);
-        if (png.labels)
-            olat__tell(found, OLAT__OF_MASK, "of labels, by a palette of colours: all but index 0 is kept");
-        *width = png.width;
-        *height = png.height;
-        *format = png.format;
-        *pixels = png.out;
-    }
+    } else if (!failed && size >= 3 && !memcmp(bytes, "\xFF\xD8\xFF", 3))
+        failed = olat__jpeg_file(path, bytes, size, is_mask, &image, found, error);
+    else if (!failed) failed = olat__png_file(path, bytes, size, is_mask, &image, found, error);
+    *width = image.width;
+    *height = image.height;
+    *format = image.format;
+    *pixels = image.pixels;
     free(bytes);
     return failed;
 }

@@ -20,8 +20,8 @@
    Or a frame is a camera's, with lists: light_positions, light_intensities, file_paths, less those that
    exclude_list.txt names.
 
-   IMAGES  PNG and OpenEXR as images.h reads them. A name without an ending is .png, or .exr where there is no
-   such PNG.
+   IMAGES  PNG, JPEG and OpenEXR as images.h reads them. A name without an ending is .png, else .exr, .jpg or
+   .jpeg where there is no such PNG.
 
    MASKS  Where a mask's alpha varies it is what is kept, of an indexed image with a palette of colours and
    black as index 0 all but that, else what is white. Where no mask of the dataset has a number of 16 or more,
@@ -468,12 +468,14 @@ static const char *olat__path_problem(const char *path, size_t length, int allow
     return NULL;
 }
 
+/* Of images that can be read, in the order in which they are looked for. */
+static const char *const olat__endings[4] = {".png", ".exr", ".jpg", ".jpeg"};
+
 /* Refuses a name that ends as those of another kind of image do; 1 if it does. */
 static int olat__other_image(olat__json *j, const olat__node *name) {
     static const char *const kinds[][2] = {
-        {".jpg", "JPEG"},  {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".webp", "WebP"}, {".hdr", "Radiance HDR"},
-        {".tif", "TIFF"},  {".tiff", "TIFF"}, {".bmp", "BMP"},  {".gif", "GIF"},   {".heic", "HEIC"},
-        {".avif", "AVIF"}, {".dng", "DNG"},   {".ppm", "PPM"}};
+        {".webp", "WebP"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"},  {".tiff", "TIFF"}, {".bmp", "BMP"},
+        {".gif", "GIF"},   {".heic", "HEIC"},        {".avif", "AVIF"}, {".dng", "DNG"},   {".ppm", "PPM"}};
     const size_t size = name->text_length;
     for (size_t i = 0; i < sizeof kinds / sizeof *kinds; i++) {
         const size_t length = strlen(kinds[i][0]);
@@ -488,12 +490,19 @@ static int olat__other_image(olat__json *j, const olat__node *name) {
     return 0;
 }
 
-static int olat__ends(const char *text, size_t length, const char *ending) {
-    return length >= 4 && olat__same_letters(text + length - 4, ending, 4);
+/* Which of them a name has; NULL: none. */
+static const char *olat__ending(const olat__node *name) {
+    for (int i = 0; i < 4; i++) {
+        const size_t length = strlen(olat__endings[i]), size = name->text_length;
+        if (size >= length && olat__same_letters(name->text + size - length, olat__endings[i], length))
+            return olat__endings[i];
+    }
+    return NULL;
 }
 
-/* Checks a path out of the file and joins it to the folder, with ext, else ".png", where it is not whole and
-   has no ending; where no such .png is there but an .exr, that is meant. NULL after a failure. */
+/* Checks a path out of the file and joins it to the folder. One that is not whole gets ext, else ".png", if
+   it has no ending or a file of both is there; without ext, or with ".png", where there is no such file but
+   one of another ending, that is meant. NULL after a failure. */
 static char *olat__join(olat__json *j, const char *folder, const olat__node *path, const olat__node *ext,
                         int whole, int flags) {
     const char *problem, *suffix = ext ? ext->text : ".png";
@@ -504,9 +513,8 @@ static char *olat__join(olat__json *j, const char *folder, const olat__node *pat
         olat__json_fail(j, path, "%s", problem);
     }
     if (j->failed || (!ext && !(flags & OLAT_NO_IMAGES) && olat__other_image(j, path))) return NULL;
-    if (whole || olat__ends(path->text, path->text_length, ".png") ||
-        olat__ends(path->text, path->text_length, ".exr"))
-        suffix = "";
+    const char *own = olat__ending(path);
+    if (whole || (own && (!ext || own == olat__ending(ext)))) suffix = "";
     const size_t room = used + path->text_length + 8;
     char *file;
     if ((file = (char *)malloc(room)) == NULL) {
@@ -518,11 +526,10 @@ static char *olat__join(olat__json *j, const char *folder, const olat__node *pat
     for (size_t i = used; file[i]; i++) {
         if (file[i] == '\\') file[i] = '/'; /* datasets made on Windows */
     }
-    char *ending = file + strlen(file) - 4;
-    if (!strcmp(suffix, ".png") && stat(file, &there) != 0) {
-        memcpy(ending, ".exr", 4);
-        if (stat(file, &there) != 0) memcpy(ending, ".png", 4);
-    }
+    char *ending = file + strlen(file) - strlen(suffix);
+    const int searches = !own && !strcmp(suffix, ".png");
+    for (int i = 1; i <= 4 && searches && stat(file, &there) != 0; i++) strcpy(ending, olat__endings[i % 4]);
+    if (own && stat(file, &there) != 0) *ending = 0;
     return file;
 }
 
@@ -534,10 +541,10 @@ static void olat__read_paths(olat__json *j, const olat__node *node, const char *
     const olat__node *ext = whole ? NULL : olat__find(j, node, "file_ext"),
                      *of_mask = olat__find(j, node, "mask_path");
     if (!path && !(flags & OLAT_NO_IMAGES)) olat__json_fail(j, node, "file_path or img_path is missing");
-    if (path && ext &&
-        (ext->type != OLAT__STRING ||
-         (!olat__other_image(j, ext) && !olat__is_word(ext, ".png") && !olat__is_word(ext, ".exr")))) {
-        olat__json_fail(j, ext, "\".png\" or \".exr\" was expected: other images cannot be read");
+    const char *ending = ext && ext->type == OLAT__STRING ? olat__ending(ext) : NULL;
+    if (path && ext && (!ending || strlen(ending) != ext->text_length) &&
+        (ext->type != OLAT__STRING || !olat__other_image(j, ext))) {
+        olat__json_fail(j, ext, "\".png\", \".jpg\" or \".exr\" was expected: other images cannot be read");
     }
     if (path) *file = olat__join(j, folder, path, ext, whole != NULL, flags);
     if (of_mask && of_mask->type != OLAT__NULL) *mask = olat__join(j, folder, of_mask, NULL, 0, flags);

@@ -79,6 +79,60 @@ if has oiiotool; then
     fi
 fi
 
+if has cjpeg && has djpeg && has jpegtran; then # of libjpeg-turbo: the same numbers, a 255th apart if anything
+    same() { # same FILE.jpg
+        djpeg -rgb -pnm "$1" >"$work/want.pnm" && "$build/pixels" --bytes "$1" >"$work/read.pnm" && cmp -s "$work/read.pnm" "$work/want.pnm"
+    }
+    seed=1
+    for size in 1x1 1x2 3x3 5x4 9x17 34x3 33x21 70x50; do
+        seed=$((seed + 1))
+        LC_ALL=C awk -v size=$size -v s=$seed 'BEGIN { split(size, n, "x"); print "P3", n[1], n[2], 255; for (i = 0; i < n[1] * n[2]; i++) {
+            x = i % n[1]; y = int(i / n[1]); for (c = 0; c < 3; c++) { s = (s * 16807 + 12345) % 2147483647
+            v = 128 + 90 * sin(x * (0.13 + 0.05 * c) + y * 0.09) + (int(x / 7) % 2 ? 60 : -20) + s % 41 - 20
+            printf "%d ", (v < 0 ? 0 : v > 255 ? 255 : v) } print "" } }' >"$work/random.ppm"
+        for sampling in 1x1 2x1 2x2 1x2 4x1 1x4 3x1 4x2 2x2,1x1,2x1 2x1,1x2,1x1; do
+            wrong=0
+            for quality in 5 90; do
+                for options in "" "-progressive" "-restart 1B" "-progressive -restart 2B -smooth 20" "-optimize -grayscale" "-rgb"; do
+                    cjpeg -quality $quality -sample $sampling $options -outfile "$work/random.jpg" "$work/random.ppm" 2>/dev/null &&
+                        same "$work/random.jpg" || { wrong=1; echo "    $size $sampling $quality $options"; }
+                done
+            done
+            [ $wrong -eq 0 ]
+            count "libjpeg-turbo: $size $sampling"
+        done
+    done
+    cjpeg -quality 90 -sample 2x2 "$work/random.ppm" >"$work/a.jpg"
+    jpegtran -arithmetic "$work/a.jpg" >"$work/arithmetic.jpg"
+    "$build/pixels" "$work/arithmetic.jpg" 2>&1 >/dev/null | grep -q "arithmetic codes cannot be read: repack" &&
+        jpegtran "$work/arithmetic.jpg" >"$work/b.jpg" && cmp -s "$work/a.jpg" "$work/b.jpg"
+    count "jpegtran: what an error advises"
+    jpegtran -progressive -rotate 90 "$work/a.jpg" >"$work/b.jpg" && same "$work/b.jpg"
+    count "jpegtran: rotated"
+    if has identify; then
+        for options in "-sampling-factor 4:2:0" "-sampling-factor 4:1:1" "-interlace JPEG" "-colorspace Gray" "-quality 100" "-density 72x72"; do
+            convert "$work/random.ppm" $options "$work/c.jpg" && same "$work/c.jpg" && notes "$work/c.jpg" ""
+            count "ImageMagick: $options"
+        done
+        convert "$work/random.ppm" -colorspace CMYK "$work/cmyk.jpg"
+        "$build/pixels" "$work/cmyk.jpg" 2>&1 >/dev/null | grep -q "CMYK cannot be read" && convert "$work/cmyk.jpg" -colorspace sRGB "$work/rgb.png" &&
+            "$build/pixels" "$work/rgb.png" >/dev/null
+        count "ImageMagick: what an error advises"
+        if [ -f "$icc/compatibleWithAdobeRGB1998.icc" ] && [ -n "$srgb" ]; then
+            convert "$work/in.ppm" -depth 8 -profile "$icc/compatibleWithAdobeRGB1998.icc" -quality 100 -sampling-factor 4:4:4 "$work/c.jpg" &&
+                convert "$work/c.jpg" -depth 16 -intent relative -profile "$srgb" -type truecolor -compress none "$work/want.ppm" &&
+                light "$work/c.jpg" "$work/want.ppm" srgb 0.001 && notes "$work/c.jpg" "not sRGB (ICC profile)"
+            count "ImageMagick: JPEG in Adobe's RGB"
+        fi
+    fi
+    if has exiftool; then
+        rm -f "$work/turned.jpg"
+        exiftool -q -q -n -Orientation=6 -o "$work/turned.jpg" "$work/a.jpg"
+        same "$work/turned.jpg" && notes "$work/turned.jpg" "(EXIF's orientation 6)"
+        count "exiftool: orientation of JPEG"
+    fi
+fi
+
 wanted() { # wanted FILE CHANNELS: in want.txt, the light that oiiotool finds in these
     rm -f "$work/want.exr"
     oiiotool "$1" --ch "$2" --croptofull -d float -o "$work/want.exr" &&

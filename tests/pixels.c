@@ -1,5 +1,7 @@
 /* What tests/images.sh compares with other programs' readings:
 
+   pixels --bytes FILE
+       the stored bytes as PPM
    pixels FILE [MASK]
        the image as a photograph of a dataset beside it, whose name is FILE.json: lines of x, y, and red,
    green, blue as linear sRGB light, and alpha; before them the notes */
@@ -12,9 +14,26 @@ static int failed(const char *message) {
     return 1;
 }
 
+static int print_bytes(const char *path) {
+    olat__found found;
+    char error[512];
+    int width, height;
+    ssdgs_pixels format;
+    void *pixels;
+    memset(&found, 0, sizeof found);
+    if (olat__image_file(path, 1, &width, &height, &format, &pixels, &found, error)) return failed(error);
+    if (format != SSDGS_PIXELS_RGBA8) return failed("not of bytes");
+    printf("P6\n%d %d\n255\n", width, height);
+    for (size_t i = 0; i < (size_t)width * (size_t)height; i++)
+        fwrite((unsigned char *)pixels + 4 * i, 1, 3, stdout);
+    free(pixels);
+    return 0;
+}
+
 int main(int argc, char **argv) {
     olat_dataset set;
     char error[512], json[4096], folder[4096];
+    if (argc == 3 && !strcmp(argv[1], "--bytes")) return print_bytes(argv[2]);
     if (argc < 2 || argc > 3 || strlen(argv[1]) > 2000)
         return failed("usage: pixels FILE [MASK], both in one folder");
     const char *slash = strrchr(argv[1], '/'), *name = slash ? slash + 1 : argv[1];

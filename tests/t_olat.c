@@ -1077,7 +1077,7 @@ static void test_datasets(void) {
         {TOP "{\"file_path\":7," LIGHT POSE "}]}", "file_path: a string"},
         {TOP "{\"file_ext\":\".exr\"," FILE_A LIGHT POSE "}]}", "a.exr: cannot be opened"},
         {TOP "{\"file_ext\":\".tga\"," FILE_A LIGHT POSE "}]}",
-         "file_ext: \".png\" or \".exr\" was expected"},
+         "file_ext: \".png\", \".jpg\" or \".exr\" was expected"},
         {TOP "{\"file_ext\":3," FILE_A LIGHT POSE "}]}", "file_ext"},
         {"{\"camera_angle_x\":4,\"frames\":[" FRAME "]}", "camera_angle_x"},
         {"{\"camera_angle_x\":\"1\",\"frames\":[" FRAME "]}", "camera_angle_x: a number"},
@@ -1874,16 +1874,15 @@ static void test_marks(void) {
 static int photographed(const unsigned char *bytes, size_t size) {
     static olat__found found;
     unsigned char *copy = (unsigned char *)malloc(size + !size);
-    olat__png png;
-    memset(&png, 0, sizeof png);
+    olat__image image;
+    memset(&image, 0, sizeof image);
     memset(&found, 0, sizeof found);
     memset(error, 0, sizeof error);
     memcpy(copy, bytes, size);
-    const int failed =
-        olat__png_decode("PNG", copy, size, &png, error) || olat__png_photo("PNG", &png, &found, error);
+    const int failed = olat__png_file("PNG", copy, size, 0, &image, &found, error);
     free(copy);
-    meter_free(png.out);
-    return live == 0 && (failed ? error[0] != 0 : png.format < SSDGS_PIXELS_RGBA32F && found.count < 4);
+    meter_free(image.pixels);
+    return live == 0 && (failed ? error[0] != 0 : image.format < SSDGS_PIXELS_RGBA32F && found.count < 4);
 }
 
 /* Every byte of profiles and chunks changed and left out, behind sound checksums. */
@@ -1946,7 +1945,7 @@ static void test_masks(void) {
         {",\"mask_path\":\"../m\"", "mask_path: the path leaves"},
         {",\"mask_path\":7", "mask_path: a string"},
         {",\"mask_path\":\"a\"", "a.png: the mask has 6 x 4 pixels, its photograph 9 x 7"},
-        {",\"mask_path\":\"m.jpg\"", "m.jpg: JPEG images cannot be read"},
+        {",\"mask_path\":\"m.jpg\"", "m.jpg: cannot be opened"},
         {",\"mask_path\":\"broken.png\"", "broken.png: byte 0"},
         {",\"mask_path\":\"\"", "mask_path: the path is empty"}};
     char text[1200];
@@ -1997,15 +1996,13 @@ static void test_masks(void) {
 /* Other kinds of image, by their names and by their first bytes. */
 static void test_kinds_of_image(void) {
     static const char *const names[][2] = {
-        {".jpg", "JPEG"},         {".JPG", "JPEG"},  {".jpeg", "JPEG"}, {".jpe", "JPEG"}, {".WebP", "WebP"},
-        {".hdr", "Radiance HDR"}, {".tif", "TIFF"},  {".TIFF", "TIFF"}, {".bmp", "BMP"},  {".gif", "GIF"},
-        {".heic", "HEIC"},        {".avif", "AVIF"}, {".dng", "DNG"},   {".ppm", "PPM"}};
+        {".WebP", "WebP"}, {".hdr", "Radiance HDR"}, {".tif", "TIFF"},  {".TIFF", "TIFF"}, {".bmp", "BMP"},
+        {".gif", "GIF"},   {".heic", "HEIC"},        {".avif", "AVIF"}, {".dng", "DNG"},   {".ppm", "PPM"}};
     static const struct {
         const char *bytes;
         size_t size;
         const char *message;
-    } files[] = {{"\xFF\xD8\xFF\xE0\0\x10JFIF", 10, "byte 0: this is a JPEG file"},
-                 {"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
+    } files[] = {{"RIFF\1\2\3\4WEBPVP8 ", 16, "a WebP file"},
                  {"GIF89a\1\2", 8, "a GIF file"},
                  {"II*\0\1\2", 6, "a TIFF file"},
                  {"MM\0*\1\2", 6, "a TIFF file"},
@@ -2050,6 +2047,12 @@ static void test_kinds_of_image(void) {
         CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0, files[i].message) &&
               strstr(error, "odd.png: byte 0: "));
     }
+    memcpy(file, "\xFF\xD8\xFF\xE0\0\x10JFIF",
+           file_size = 10); /* what is called .png may be JPEG, not for olat_read_png */
+    CHECK(refused_with("byte 0: this is a JPEG file, not a PNG file: convert it to PNG"));
+    write_bytes(FOLDER "/odd.png");
+    CHECK(load_fails(TOP "{\"file_path\":\"odd\"," LIGHT POSE "}]}", 0,
+                     "odd.png: byte 2: the file ends early"));
     CHECK(live == 0);
 }
 
