@@ -4,6 +4,7 @@
    program is named after. A finding ends the program. Not drawn: threads, processes that share a batch. */
 #define SSDGS_IMPLEMENTATION
 #include "../../ssdgs.h"
+#include "../../examples/colmap.h"
 #include "../../examples/olat.h"
 #include "../../examples/reduce.h"
 #include "../../examples/sky.h"
@@ -1310,7 +1311,59 @@ typedef struct target {
     const char *name;
     void (*run)(const unsigned char *data, size_t size);
 } target;
+/* A model of COLMAP's: whether it is binary, where its second and third file begin, the three. Its lenses are
+   used on a picture. */
+static void fuzz_colmap(const unsigned char *data, size_t size) {
+    static const char *const names[3][2] = {
+        {"cameras.txt", "cameras.bin"}, {"images.txt", "images.bin"}, {"points3D.txt", "points3D.bin"}};
+    if (size < 5) return;
+    const int binary = data[0] & 1;
+    size_t ends[4] = {5, 0, 0, size};
+    for (size_t i = 0; i < 2; i++) {
+        const size_t length = (size_t)(data[1 + 2 * i] | data[2 + 2 * i] << 8);
+        ends[i + 1] = length < size - ends[i] ? ends[i] + length : size;
+    }
+    for (int i = 0; i < 3; i++) {
+        remove(put_file(names[i][!binary], "", 0));
+        put_file(names[i][binary], data + ends[i], ends[i + 1] - ends[i]);
+    }
+    colmap_model m;
+    char error[512] = "";
+    if (colmap_load(folder, &m, error)) {
+        HOLDS(error[0] && !m.images && !m.points);
+        return;
+    }
+    HOLDS(m.image_count > 0);
+    for (int i = 0; i < m.image_count; i++) {
+        const double offset[3] = {1, 2, 3};
+        double centre[3];
+        HOLDS(m.images[i].camera >= 0 && m.images[i].camera < m.camera_count);
+        HOLDS(!olat__path_problem(m.images[i].name, strlen(m.images[i].name), 0));
+        colmap_centre(m.images + i, offset, centre);
+        for (int c = 0; c < 3; c++) HOLDS(fabs(centre[c]) < 1e13);
+    }
+    for (int i = 0; i < m.point_count; i++)
+        for (int k = 0; k < m.points[i].seen; k++) {
+            const int image = m.tracks[m.points[i].track + k];
+            HOLDS(image >= 0 && image < m.image_count);
+        }
+    for (int i = 0; i < m.camera_count && i < 4; i++) {
+        olat_lens *lens = m.cameras + i;
+        if (!olat_lens_zoom(lens)) continue;
+        const double shrink = fmax(lens->width, lens->height) / 16.0; /* to a picture of 16 pixels */
+        for (int c = 0; c < 2; c++) lens->focal[c] /= shrink, lens->centre[c] /= shrink;
+        lens->width = lens->width > shrink ? (int)(lens->width / shrink) : 1;
+        lens->height = lens->height > shrink ? (int)(lens->height / shrink) : 1;
+        if (!olat_lens_zoom(lens)) continue;
+        uint16_t pixels[4 * 16 * 16];
+        for (size_t k = 0; k < sizeof pixels / sizeof *pixels; k++) pixels[k] = (uint16_t)(k * 40503);
+        free(olat_resample(pixels, SSDGS_PIXELS_RGBA16, lens, 1));
+    }
+    colmap_free(&m);
+}
+
 static const target targets[] = {{"png", fuzz_png},
+                                 {"colmap", fuzz_colmap},
                                  {"jpeg", fuzz_jpeg},
                                  {"exr", fuzz_exr},
                                  {"unfilter", fuzz_unfilter},
