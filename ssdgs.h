@@ -168,9 +168,9 @@ MACROS, defined before the header; those with * in every file that includes it
 BESIDE IT, in examples/, headers on this interface
   judge.h and hull.h judge captures, reduce.h makes levels of detail, sky.h lights of environment maps,
   unbake.h models that take light of plain splats, splats.h reads packed ones, adopt.h mends edited models,
-  olat.h reads datasets, images.h PNG and OpenEXR; gpu/ draws scenes in OpenGL 4.3, in a context
-  of its own or in an engine's. Nothing finds cameras or lights (options.refine corrects small errors), traces
-  light between objects, undistorts lenses, or compresses models.
+  olat.h reads datasets, colmap.h what COLMAP found, images.h PNG, JPEG and OpenEXR; gpu/ draws scenes in
+  OpenGL 4.3, in a context of its own or in an engine's. Nothing finds cameras or lights (options.refine
+  corrects small errors), traces light between objects, or compresses models.
 
 CHANGES, for programs written for 0.2.4
   a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
@@ -178,6 +178,7 @@ CHANGES, for programs written for 0.2.4
   ssdgs_environment(context, ..) sky_lights(..) of examples/sky.h, which returns what is wrong
   ssdgs_model_adopt(model, from) adopt_model(context, &model, ..) of examples/adopt.h: another model
   notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
+  ssdgs_checkpoint_iteration(..) another argument: of how many iterations
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
   a hook's view is `cached` 1    2; 1 says that WALK is to be done again
   ssdgs_scene_light(.., lights)  the camera before the lights, or NULL
