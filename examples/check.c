@@ -22,6 +22,7 @@ typedef struct facts {
 
 typedef struct check {
     const char *dataset, *train_json, *out;
+    int downscale;
     ssdgs_context *context;
     olat_dataset sets[2]; /* train, test */
     facts *found[2];
@@ -425,12 +426,13 @@ static int draw_places(const check *k, const char *path) {
 
 static int usage(void) {
     fprintf(stderr,
-            "usage: check DATASET [--out DIR] [--bounds X,Y,Z,X,Y,Z] [--train-json FILE]\n"
+            "usage: check DATASET [--out DIR] [--bounds X,Y,Z,X,Y,Z] [--train-json FILE] [--downscale N]\n"
             "Says what is right and wrong with a capture; lines with an arrow ask for something.\n"
             "  --out DIR     draws into a folder: photographs.png (clipped: red, black: blue), places.svg\n"
             "  --bounds ...  corners of the box that holds the object; the dataset's own, else\n"
             "                -0.5,-0.5,-0.5,0.5,0.5,0.5\n"
-            "  --train-json FILE  another list of frames in DATASET; transforms_train.json\n");
+            "  --train-json FILE  another list of frames in DATASET; transforms_train.json\n"
+            "  --downscale N  photographs and cameras N times smaller, as train's\n");
     return 2;
 }
 
@@ -462,7 +464,8 @@ static int run(check *k) {
     if (!failed && ssdgs_context_create(&desc, &k->context)) failed = fail("out of memory");
     const olat_reader reader = {k->context, NULL, NULL};
     for (int s = 0; s < (file ? 2 : 1) && !failed; s++) {
-        if (olat_load_at(k->dataset, lists[s], 0, s ? k->sets[0].origin : NULL, &reader, k->sets + s, error))
+        if (olat_load_at(k->dataset, lists[s], OLAT_DOWNSCALE(k->downscale), s ? k->sets[0].origin : NULL,
+                         &reader, k->sets + s, error))
             return fail(error);
         k->found[s] = (facts *)calloc((size_t)k->sets[s].count, sizeof **k->found);
         if (!k->found[s]) return fail("out of memory");
@@ -497,7 +500,12 @@ int main(int argc, char **argv) {
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--out") && i + 1 < argc) k.out = argv[++i];
         else if (!strcmp(argv[i], "--train-json") && i + 1 < argc) k.train_json = argv[++i];
-        else if (!strcmp(argv[i], "--bounds") && i + 1 < argc) {
+        else if (!strcmp(argv[i], "--downscale") && i + 1 < argc) {
+            double times;
+            if (!olat_argument(argv[++i], &times) || !(times >= 1 && times <= 1024 && floor(times) >= times))
+                return usage();
+            k.downscale = (int)times;
+        } else if (!strcmp(argv[i], "--bounds") && i + 1 < argc) {
             const char *at = argv[++i];
             for (int c = 0; c < 6; c++) {
                 const size_t used = olat__parse_number(at, k.box + c);

@@ -25,14 +25,16 @@ enum {
     SKY,
     ANIMATION,
     SIDE,
+    DOWNSCALE,
     TRAJECTORY, /* it and those after it take no value */
     COMPONENTS,
     FIT,
     OPTION_COUNT
 };
 static const char *const option_names[OPTION_COUNT] = {
-    "--split",   "--out", "--background", "--sheet", "--threads",    "--isa",        "--networks", "--reduce",
-    "--ambient", "--sky", "--animation",  "--size",  "--trajectory", "--components", "--fit"};
+    "--split",     "--out",        "--background", "--sheet", "--threads",   "--isa",
+    "--networks",  "--reduce",     "--ambient",    "--sky",   "--animation", "--size",
+    "--downscale", "--trajectory", "--components", "--fit"};
 
 static const char *const help[] = {
     "usage: relight MODEL.ply DATASET --out DIR [OPTION...]",
@@ -43,6 +45,7 @@ static const char *const help[] = {
     "  --out DIR                where the images go",
     "  --split NAME             test (default), train or valid: the frames of transforms_NAME.json",
     "  --background COLOUR      black (default) or white",
+    "  --downscale N            photographs and cameras N times smaller, as train's",
     "  --fit                    also scores each view with its camera and light fitted to its photograph,",
     "                           apart: \"fitted\" in DIR/metrics.json",
     "  --components             also writes each term, shadow, normal, depth and alpha",
@@ -99,6 +102,7 @@ typedef struct job {
     const char *given[OPTION_COUNT], *model_path, *dataset, *out;
     ssdgs_context_desc desc;
     ssdgs_real background[3];
+    int downscale;
     int reduce, size; /* Gaussians to be left, width of the path's pictures; 0 = all, the photographs' */
     double ambient;
     ssdgs_context *context;
@@ -163,7 +167,8 @@ static int parse(job *j, int argc, char **argv) {
     if (value && !strcmp(value, "white")) j->background[0] = j->background[1] = j->background[2] = 1;
     else if (value && strcmp(value, "black")) return usage("no such background:", value);
     if (parse_number(j, THREADS, 0, 1024, &j->desc.threads) ||
-        parse_number(j, REDUCE, 1, 1000000000, &j->reduce) || parse_number(j, SIDE, 1, 4096, &j->size))
+        parse_number(j, REDUCE, 1, 1000000000, &j->reduce) || parse_number(j, SIDE, 1, 4096, &j->size) ||
+        parse_number(j, DOWNSCALE, 1, 1024, &j->downscale))
         return 2;
     value = j->given[AMBIENT];
     j->ambient = value ? strtod(value, &end) : 1;
@@ -644,9 +649,8 @@ static int load_frames(job *j) {
     char name[64];
     snprintf(name, sizeof name, "transforms_%s.json", path_wanted ? "train" : split);
     const olat_reader reader = {j->context, NULL, NULL};
-    if (olat_load_at(j->dataset, name, path_wanted || !valid ? 0 : OLAT_NO_IMAGES, origin, &reader, &j->data,
-                     error))
-        return !fail(error);
+    const int flags = OLAT_DOWNSCALE(j->downscale) | (path_wanted || !valid ? 0 : OLAT_NO_IMAGES);
+    if (olat_load_at(j->dataset, name, flags, origin, &reader, &j->data, error)) return !fail(error);
     olat_print_notes(&j->data, "relight");
     const ssdgs_object placed = ssdgs_object_default(j->model);
     if (olat_bounds(&placed, low, high)) return !fail(ssdgs_error_message(j->context));

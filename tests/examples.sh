@@ -173,6 +173,8 @@ check "the last score is told" grep -q "held out: PSNR [0-9.]* after 40 iteratio
 check "it goes on with those" says 0 "held out: PSNR [0-9.]* after 44 iterations" again --keep-best --iterations 44 --resume
 check "others are not those of its run" says 1 "its run had 11 photographs, this one has 12" again --resume
 check "smaller photographs" says 0 "tiny: 12 photographs of 42x42" again --downscale 3
+check "and of those its pictures" says 0 "^test: PSNR" "$build/relight" "$out/again.ply" "$set" --out "$out/small" --downscale 3
+check "of that size" test "$(od -An -tu1 -j19 -N1 "$(ls "$out"/small/*.png | head -n 1)")" -eq 42
 check "none are left" says 1 "too few to be made 129 times smaller" again --downscale 129
 ln -s "$out/target.ply" "$out/dangling.ply"
 check "a link to nothing" says 0 "^test: PSNR" "$build/train" "$set" -o "$out/dangling.ply" --iterations 1 --points 100
