@@ -3345,7 +3345,7 @@ typedef struct ssdgs__scratch {
         pixel_shadow, bounds, image, sources, lightings, layouts, blocks, trees, median, empty, activations,
         scratch;
     ssdgs__buffer slots, lane_slots, view_slots, layer_gradient, highlight_sums, pixel_gradient,
-        splat_gradient, color_gradient, gradient, global_gradient, loss, target, photo_lights;
+        splat_gradient, color_gradient, gradient, global_gradient, loss, photo_lights;
 } ssdgs__scratch;
 
 static void ssdgs__buffers_release(ssdgs_context *context, void *buffers, size_t bytes) {
@@ -10252,14 +10252,32 @@ typedef struct ssdgs__store_job {
     ssdgs_frame *frame;
     const ssdgs_photo *photo;
     const ssdgs_real *background; /* stored values */
-    ssdgs_real *image, *slope, *by_transmittance,
-        *target; /* planes: stored values, d(image)/d(pixels), d(image)/d(transmittance); stored */
+    ssdgs_real *image, *target;   /* planes of stored values: rendered, photographed */
 } ssdgs__store_job;
 
-/* The rendered image as stored values, beside the photograph on the same background: with u = pixels / (1 -
-   T), image = (1 - T) encode(u) + T background, d/d(pixels) = encode'(u), d/dT = background - encode(u) + u
-   encode'(u). A photograph's 1 may stand for anything brighter, so there encode(u) is at most 1; halves and
-   floats stand for what they are. */
+/* Of a channel of up to SSDGS__PIXELS pixels: u = pixels / (1 - T), its stored value s(u) and ds/du. A
+   photograph's 1 may stand for anything brighter, so there s is at most 1; halves and floats stand for what
+   they are. */
+static void ssdgs__store_values(const ssdgs__store_job *job, int c, size_t begin, size_t n, ssdgs_real *u,
+                                ssdgs_real *s, ssdgs_real *slope) {
+    const ssdgs_frame *frame = job->frame;
+    const ssdgs_real *t = frame->transmittance + begin,
+                     *pixels = frame->pixels +
+                               (size_t)frame->camera.width * (size_t)frame->camera.height * (size_t)c + begin;
+    for (size_t i = 0; i < n; i++) u[i] = pixels[i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
+    for (size_t i = n; i < n + 16; i++) u[i] = 0;
+    if (frame->settings.transfer != SSDGS_TRANSFER_NONE) frame->context->k->srgb_encode(s, slope, u, n);
+    else
+        for (size_t i = 0; i < n; i++) s[i] = u[i], slope[i] = 1;
+    if (ssdgs__is_light(job->photo)) return;
+    for (size_t i = 0; i < n; i++) {
+        const ssdgs_real shown = ssdgs__photo_number(job->photo, 4 * (begin + i) + (size_t)c);
+        if (shown > SSDGS__CLIPPED && s[i] > shown) s[i] = shown, slope[i] = 0;
+    }
+}
+
+/* The rendered image as stored values, (1 - T) s(u) + T background, beside the photograph on the same
+   background. */
 static void ssdgs__store_task(void *data, int index) {
     const ssdgs__store_job *job = (const ssdgs__store_job *)data;
     const ssdgs_frame *frame = job->frame;
@@ -10267,41 +10285,54 @@ static void ssdgs__store_task(void *data, int index) {
                  begin = (size_t)index * SSDGS__PIXELS;
     const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
     const ssdgs_real *t = frame->transmittance + begin;
-    const int light = ssdgs__is_light(job->photo);
-    const int linear = frame->settings.transfer == SSDGS_TRANSFER_NONE;
     ssdgs__photo_planes(frame->context->k, job->photo, frame->settings.transfer, job->background, begin,
                         begin + n, job->target);
-    ssdgs_real straight[SSDGS__PIXELS + 16], stored[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
+    ssdgs_real u[SSDGS__PIXELS + 16], s[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
     for (int c = 0; c < 3; c++) {
-        const size_t at = pixels * (size_t)c + begin;
-        for (size_t i = 0; i < n; i++)
-            straight[i] = frame->pixels[at + i] / (1 - t[i] > SSDGS__THIN ? 1 - t[i] : SSDGS__THIN);
-        for (size_t i = n; i < n + 16; i++) straight[i] = 0;
-        if (!linear) frame->context->k->srgb_encode(stored, slope, straight, n);
-        for (size_t i = 0; i < n; i++) {
-            const ssdgs_real rendered = linear ? straight[i] : stored[i],
-                             shown = ssdgs__photo_number(job->photo, 4 * (begin + i) + (size_t)c);
-            const int clipped = !light && shown > SSDGS__CLIPPED && rendered > shown;
-            const ssdgs_real s = clipped ? shown : rendered, d = clipped ? 0 : linear ? 1 : slope[i];
-            job->image[at + i] = (1 - t[i]) * s + t[i] * job->background[c];
-            job->slope[at + i] = d;
-            job->by_transmittance[at + i] = job->background[c] - s + d * straight[i];
-        }
+        ssdgs_real *image = job->image + pixels * (size_t)c + begin;
+        ssdgs__store_values(job, c, begin, n, u, s, slope);
+        for (size_t i = 0; i < n; i++) image[i] = (1 - t[i]) * s[i] + t[i] * job->background[c];
     }
 }
 
+/* d/d(pixels) = s'(u), d/dT = background - s(u) + u s'(u). */
 static void ssdgs__store_backward_task(void *data, int index) {
     const ssdgs__store_job *job = (const ssdgs__store_job *)data;
     const size_t pixels = (size_t)job->frame->camera.width * (size_t)job->frame->camera.height;
     const size_t begin = (size_t)index * SSDGS__PIXELS;
-    const size_t end = begin + SSDGS__PIXELS < pixels ? begin + SSDGS__PIXELS : pixels;
-    ssdgs_real *gradient = job->frame->pixel_gradient, *transmittance_gradient = gradient + 3 * pixels;
-    for (size_t i = begin; i < end; i++) transmittance_gradient[i] = 0;
-    for (size_t c = 0; c < 3; c++)
-        for (size_t i = begin; i < end; i++) {
-            transmittance_gradient[i] += gradient[pixels * c + i] * job->by_transmittance[pixels * c + i];
-            gradient[pixels * c + i] *= job->slope[pixels * c + i];
+    const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin;
+    ssdgs_real *gradient = job->frame->pixel_gradient + begin, *by_t = gradient + 3 * pixels;
+    ssdgs_real u[SSDGS__PIXELS + 16], s[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
+    for (size_t i = 0; i < n; i++) by_t[i] = 0;
+    for (int c = 0; c < 3; c++, gradient += pixels) {
+        ssdgs__store_values(job, c, begin, n, u, s, slope);
+        for (size_t i = 0; i < n; i++) {
+            by_t[i] += gradient[i] * (job->background[c] - s[i] + slope[i] * u[i]);
+            gradient[i] *= slope[i];
         }
+    }
+}
+
+/* As if all light were the lamp's, d(image)/d(ln intensity) is slope x pixels: the step of ln intensity, at
+   most 1, that brings the image nearest to the photograph, and the sum of squares that it is sure by. */
+static void ssdgs__intensity_fit(const ssdgs__store_job *job, double found[2]) {
+    const size_t pixels = (size_t)job->frame->camera.width * (size_t)job->frame->camera.height;
+    ssdgs_real u[SSDGS__PIXELS + 16], s[SSDGS__PIXELS + 16], slope[SSDGS__PIXELS + 16];
+    double along = 0, across = 0;
+    for (int c = 0; c < 3; c++)
+        for (size_t begin = 0; begin < pixels; begin += SSDGS__PIXELS) {
+            const size_t n = begin + SSDGS__PIXELS < pixels ? SSDGS__PIXELS : pixels - begin,
+                         at = pixels * (size_t)c + begin;
+            ssdgs__store_values(job, c, begin, n, u, s, slope);
+            for (size_t i = 0; i < n; i++) {
+                const double d = (double)slope[i] * (double)job->frame->pixels[at + i];
+                across += d * d;
+                along += d * ((double)job->target[at + i] - (double)job->image[at + i]);
+            }
+        }
+    const double step = across > 0 ? along / across : 0; /* without bounds where a photograph is black */
+    found[0] = step < -1 ? -1 : step > 1 ? 1 : step;
+    found[1] = across;
 }
 
 typedef struct ssdgs__normals_job {
@@ -10400,23 +10431,12 @@ static ssdgs_result ssdgs__photo_backward(ssdgs_frame *frame, ssdgs_model *model
     }
     if (!result) result = ssdgs__run_stages(frame, SSDGS_STAGE_PROJECT, SSDGS_STAGE_COMPOSITE);
     if (result) return result;
-    ssdgs_real *image, *target;
-    SSDGS__RESERVE(frame->scratch->image, image, ssdgs_real, pixels * 9);
-    SSDGS__RESERVE(frame->scratch->target, target, ssdgs_real, pixels * 3);
-    ssdgs__store_job job = {frame, photo_job->photo,   photo_job->background,
-                            image, image + pixels * 3, image + pixels * 6,
-                            target};
+    ssdgs_real *image;
+    SSDGS__RESERVE(frame->scratch->image, image, ssdgs_real, pixels * 6);
+    ssdgs__store_job job = {frame, photo_job->photo, photo_job->background, image, image + pixels * 3};
     ssdgs__parallel(context, tasks, ssdgs__store_task, &job);
-    double along = 0,
-           across = 0; /* as if all light were the lamp's, d(image)/d(ln intensity) is slope x pixels */
-    for (size_t i = 0; i < 3 * pixels && photo_job->exact; i++) {
-        const double d = (double)job.slope[i] * (double)frame->pixels[i];
-        across += d * d;
-        along += d * ((double)job.target[i] - (double)job.image[i]);
-    }
-    const double step = across > 0 ? along / across : 0; /* without bounds where a photograph is black */
-    frame->intensity[0] = step < -1 ? -1 : step > 1 ? 1 : step;
-    frame->intensity[1] = across;
+    frame->intensity[0] = frame->intensity[1] = 0;
+    if (photo_job->exact) ssdgs__intensity_fit(&job, frame->intensity);
     const ssdgs__images images = {job.image, job.target, camera->width, camera->height};
     result =
         ssdgs__loss(context, &frame->scratch->loss, &images, photo_job->dssim, frame->pixel_gradient, values);

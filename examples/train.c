@@ -286,7 +286,7 @@ static void on_interrupt(int signal_number) {
     signal(signal_number, SIG_DFL); /* a second Ctrl-C ends the program at once */
 }
 
-enum { BYTES_A_PIXEL = 200, BYTES_A_GAUSSIAN = 3200 }; /* of training, see tests/EXPERIMENTS.md */
+enum { BYTES_A_PIXEL = 175, BYTES_A_GAUSSIAN = 3200 }; /* of training, see tests/EXPERIMENTS.md */
 
 typedef struct run {
     int iterations, batch, checkpoint_every, judge_every, terminal;
