@@ -123,8 +123,7 @@ static void olat__lens_sample(const float *light, int w, int h, const double at[
    memory. */
 OLAT__API void *olat_resample(const void *pixels, ssdgs_pixels format, const olat_lens *lens, int downscale) {
     const int w = lens->width, h = lens->height, columns = w / downscale, rows = h / downscale,
-              bends = olat_lens_bends(lens), is_light = olat__is_light(format),
-              finer = bends && lens->zoom < 0.75 ? 2 : 1, samples = downscale * finer;
+              bends = olat_lens_bends(lens), is_light = olat__is_light(format);
     const size_t count = 4 * (size_t)w * (size_t)h, made = 4 * (size_t)columns * (size_t)rows,
                  top = format == SSDGS_PIXELS_RGBA16 ? 65535 : 255;
     float *light = (float *)malloc(count * sizeof *light),
@@ -148,10 +147,8 @@ OLAT__API void *olat_resample(const void *pixels, ssdgs_pixels format, const ola
         const size_t pixel = i / 4;
         const double x = (double)(pixel % (size_t)columns), y = (double)(pixel / (size_t)columns);
         double sum[4] = {0, 0, 0, 0};
-        for (int k = 0; k < samples * samples; k++) {
-            double at[2], v[4];
-            at[0] = (x + (k % samples + 0.5) / samples) * downscale;
-            at[1] = (y + (k / samples + 0.5) / samples) * downscale;
+        for (int k = 0; k < downscale * downscale; k++) {
+            double at[2] = {x * downscale + k % downscale + 0.5, y * downscale + k / downscale + 0.5}, v[4];
             if (bends) {
                 olat_lens_point(lens, (at[0] - lens->centre[0]) / (lens->zoom * lens->focal[0]),
                                 (at[1] - lens->centre[1]) / (lens->zoom * lens->focal[1]), at);
@@ -163,7 +160,7 @@ OLAT__API void *olat_resample(const void *pixels, ssdgs_pixels format, const ola
             for (int c = 0; c < 4; c++) sum[c] += v[c];
         }
         for (size_t c = 0; c < 4; c++) {
-            const double share = c == 3 ? samples * samples : sum[3];
+            const double share = c == 3 ? downscale * downscale : sum[3];
             double v = share > 0 ? sum[c] / share : 0;
             if (c < 3 && !is_light) v = olat__to_srgb(v);
             if (format == SSDGS_PIXELS_RGBA32F) ((float *)(void *)out)[i + c] = (float)v;
