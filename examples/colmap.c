@@ -18,7 +18,7 @@ static const char *const help[] = {
     "  --offset X,Y,Z    where the LED is beside the lamp's lens: right, up, back, in the model's unit; "
     "0,0,0",
     "  -o DATASET        a folder: gets copies of photographs and masks, transforms_train.json, and",
-    "                    transforms_test.json with every eighth photograph",
+    "                    transforms_test.json with every eighth photograph; only these lists are replaced",
     "",
     "Coordinates stay COLMAP's. The lists have the lens, which train makes straight; how bright the lamp's",
     "photographs are beside the others, from points that both show; and the box that holds the object, from",
@@ -27,13 +27,19 @@ static const char *const help[] = {
 
 enum { IMAGES, MASKS, LAMP, SHIFT, OFFSET, OUTPUT, OPTIONS, TEST_EVERY = 8, MOST_SIDE = 1024 };
 
+typedef struct source { /* a photograph's files: where they are, and where in the dataset */
+    char *from[2], *to[2];
+} source;
+
 typedef struct job {
     const char *model_folder, *given[OPTIONS];
+    char loaded[OLAT__MAX_PATH]; /* the model's own folder */
     double shift, offset[3];
     colmap_model model;
     olat_dataset all; /* by name, as the model's images that are used */
     int *images;      /* of these the model's */
     int *partners;    /* the model's image of the lamp's photograph that was taken at once, or -1 */
+    source *sources;  /* of the model's images */
     olat_guard guard;
     ssdgs_context *context;
 } job;
@@ -70,7 +76,8 @@ static int load_model(job *j, char error[512]) {
     static const char *const below[2] = {"", "/sparse"};
     char folder[OLAT__MAX_PATH], list[256] = "";
     int models = 0, best = 0, failed = 0;
-    if (has_model(j->model_folder)) return colmap_load(j->model_folder, &j->model, error);
+    snprintf(j->loaded, sizeof j->loaded, "%.3000s", j->model_folder);
+    if (has_model(j->loaded)) return colmap_load(j->loaded, &j->model, error);
     for (int b = 0; b < 2 && !models; b++)
         for (int i = -1; i < 100 && !failed; i++) {
             colmap_model next;
@@ -85,6 +92,7 @@ static int load_model(job *j, char error[512]) {
                 colmap_free(&j->model);
                 j->model = next;
                 best = i;
+                memcpy(j->loaded, folder, sizeof folder);
             } else colmap_free(&next);
         }
     if (!failed && !models)
@@ -114,91 +122,120 @@ static const char *find_file(const char *folder, const char *name, int is_mask, 
     return NULL;
 }
 
-/* Names the photograph or mask in the dataset's folder, and copies it there unless it is that file. */
-static char *take_file(job *j, const char *from, const char *kind, const char *name, char error[512]) {
-    const char *folder = j->given[OUTPUT];
+/* A path, to be freed; NULL: out of memory. */
+static char *joined(const char *folder, const char *kind, const char *name) {
     const size_t room = strlen(folder) + strlen(kind) + strlen(name) + 3;
-    char *to = (char *)malloc(room);
-    uint64_t ids[2][2];
-    unsigned char *bytes = NULL;
-    size_t size;
-    if (!to) {
-        olat__fail(error, "out of memory");
-        return NULL;
-    }
-    snprintf(to, room, "%s/%s/%s", folder, kind, name);
-    if (olat__identify(from, ids[0]) && olat__identify(to, ids[1]) && !memcmp(ids[0], ids[1], sizeof *ids))
-        return to;
-    char *slash = strrchr(to, '/');
-    *slash = 0;
-    int failed = olat_make_folder(to, error);
-    *slash = '/';
-    failed = failed || olat_guard_output(&j->guard, to, error) ||
-             olat__read_file(from, &bytes, &size, error) || olat__write_file(to, bytes, size, error);
-    free(bytes);
-    if (!failed) return to;
-    free(to);
-    return NULL;
+    char *path = (char *)malloc(room);
+    if (path) snprintf(path, room, "%s%s%s%s%s", folder, *kind ? "/" : "", kind, *name ? "/" : "", name);
+    return path;
 }
 
-/* Fills the frames of all images whose photographs are there. */
-static int take_photographs(job *j, char error[512]) {
+/* Finds the photographs and masks of all images, and makes frames of those that are there. */
+static int find_photographs(job *j, char error[512]) {
+    static const char *const kinds[2] = {"images", "masks"};
     const colmap_model *m = &j->model;
-    char path[OLAT__MAX_PATH];
     const double still[3] = {0, 0, 0};
-    int missing = 0, unmasked = 0;
-    j->all.frames = (olat_frame *)calloc((size_t)m->image_count, sizeof *j->all.frames);
-    j->images = (int *)calloc((size_t)m->image_count, sizeof *j->images);
-    j->partners = (int *)calloc((size_t)m->image_count, sizeof *j->partners);
-    if (!j->all.frames || !j->images || !j->partners) return olat__fail(error, "out of memory");
+    char path[OLAT__MAX_PATH];
+    int unmasked = 0;
+    const size_t count = (size_t)m->image_count;
+    j->all.frames = (olat_frame *)calloc(count, sizeof *j->all.frames);
+    j->images = (int *)calloc(count, sizeof *j->images);
+    j->partners = (int *)calloc(count, sizeof *j->partners);
+    j->sources = (source *)calloc(count, sizeof *j->sources);
+    if (!j->all.frames || !j->images || !j->partners || !j->sources)
+        return olat__fail(error, "out of memory");
     colmap_centre(m->images, still, j->all.origin); /* numbers stay small where coordinates are large */
-    for (int pass = 0; pass < 2; pass++)            /* inputs before outputs */
-        for (int i = 0; i < m->image_count; i++) {
-            const colmap_image *image = m->images + i;
-            const char *name = find_file(j->given[IMAGES], image->name, 0, path);
-            if (!pass) {
-                missing += !name;
-                if (name && olat_guard_input(&j->guard, path, error)) return 1;
-                if (j->given[MASKS] && find_file(j->given[MASKS], image->name, 1, path) &&
-                    olat_guard_input(&j->guard, path, error))
-                    return 1;
-                continue;
-            }
+    for (int i = 0; i < m->image_count; i++) {
+        const colmap_image *image = m->images + i;
+        source *files = j->sources + i;
+        for (int kind = 0; kind < 2; kind++) {
+            const char *folder = j->given[kind ? MASKS : IMAGES],
+                       *name = folder && (!kind || files->from[0])
+                                   ? find_file(folder, image->name, kind, path)
+                                   : NULL;
             if (!name) continue;
-            olat_frame *frame = j->all.frames + j->all.count;
-            if ((frame->file = take_file(j, path, "images", name, error)) == NULL) return 1;
-            j->images[j->all.count++] = i;
-            name = j->given[MASKS] ? find_file(j->given[MASKS], image->name, 1, path) : NULL;
-            unmasked += !name;
-            if (name && (frame->mask = take_file(j, path, "masks", name, error)) == NULL) return 1;
-            frame->lens = m->cameras[image->camera];
-            for (int r = 0; r < 3; r++) {
-                const double *row = image->rotation + 3 * r;
-                for (int c = 0; c < 3; c++) frame->camera.view[4 * r + c] = (ssdgs_real)row[c];
-                frame->camera.view[4 * r + 3] =
-                    (ssdgs_real)(image->translation[r] + olat__dot(row, j->all.origin));
-            }
+            files->from[kind] = joined(path, "", "");
+            files->to[kind] = joined(j->given[OUTPUT], kinds[kind], name);
+            if (!files->from[kind] || !files->to[kind]) return olat__fail(error, "out of memory");
+            if (olat_guard_input(&j->guard, path, error)) return 1;
         }
+        if (!files->from[0]) continue;
+        unmasked += !files->from[1];
+        olat_frame *frame = j->all.frames + j->all.count;
+        j->images[j->all.count++] = i;
+        frame->lens = m->cameras[image->camera];
+        for (int r = 0; r < 3; r++) {
+            const double *row = image->rotation + 3 * r;
+            for (int c = 0; c < 3; c++) frame->camera.view[4 * r + c] = (ssdgs_real)row[c];
+            frame->camera.view[4 * r + 3] =
+                (ssdgs_real)(image->translation[r] + olat__dot(row, j->all.origin));
+        }
+    }
     if (!j->all.count)
         return olat__fail(error, "%s: none of the %d photographs is there, as %.160s",
                           olat__tail(j->given[IMAGES]), m->image_count, m->images[0].name);
-    if (missing)
-        note("%d of the %d photographs in the model are not in %s: left out", missing, m->image_count,
-             j->given[IMAGES]);
+    if (j->all.count < m->image_count)
+        note("%d of the %d photographs in the model are not in %s: left out", m->image_count - j->all.count,
+             m->image_count, j->given[IMAGES]);
     if (j->given[MASKS] && unmasked)
         note("%d of the %d photographs have no mask in %s: all that they show is taken for the object",
              unmasked, j->all.count, j->given[MASKS]);
     return 0;
 }
 
+static int same_bytes(const unsigned char *a, size_t size, const char *path) {
+    unsigned char *b = NULL;
+    size_t other = 0;
+    char error[512];
+    const int same = !olat__read_file(path, &b, &other, error) && other == size && !memcmp(a, b, size);
+    free(b);
+    return same;
+}
+
+/* Copies photographs and masks to the dataset's folder, those that are not there. A file of other bytes there
+   is somebody's: nothing is copied then. */
+static int copy_photographs(job *j, char error[512]) {
+    for (int writes = 0; writes < 2; writes++)
+        for (int i = 0; i < 2 * j->all.count; i++) {
+            const source *files = j->sources + j->images[i / 2];
+            olat_frame *frame = j->all.frames + i / 2;
+            const char *from = files->from[i % 2], *to = files->to[i % 2];
+            uint64_t ids[2][2];
+            unsigned char *bytes = NULL;
+            size_t size;
+            if (!from) continue;
+            char **named = i % 2 ? &frame->mask : &frame->file;
+            if (!writes && (*named = joined(to, "", "")) == NULL) return olat__fail(error, "out of memory");
+            const int there = olat__identify(to, ids[1]);
+            if (there && olat__identify(from, ids[0]) && !memcmp(ids[0], ids[1], sizeof *ids)) continue;
+            if (!writes && !there && olat_guard_output(&j->guard, to, error)) return 1;
+            if (there == writes) continue; /* compared before anything is written */
+            int failed = olat__read_file(from, &bytes, &size, error);
+            if (!failed && there && !same_bytes(bytes, size, to))
+                failed =
+                    olat__fail(error, "%s: is there already, and is another file than %s: choose another -o",
+                               olat__tail(to), olat__tail(from));
+            char *slash = *named ? strrchr(*named, '/') : NULL;
+            if (!failed && !there && slash) {
+                *slash = 0;
+                failed = olat_make_folder(*named, error);
+                *slash = '/';
+                failed = failed || olat__write_file(to, bytes, size, error);
+            }
+            free(bytes);
+            if (failed) return 1;
+        }
+    return 0;
+}
+
 /* ---- the lamp ---- */
 
-/* The last number in a name, but for its ending; -1 if there is none. */
+/* The last number in a name, but for its ending, by its last 15 digits; -1 if there is none. */
 static double number_of(const char *name) {
     const char *dot = strrchr(name, '.');
     size_t end = dot ? (size_t)(dot - name) : strlen(name), begin;
     while (end > 0 && !olat__is_digit(name[end - 1])) end--;
-    for (begin = end; begin > 0 && olat__is_digit(name[begin - 1]);) begin--;
+    for (begin = end; begin > 0 && end - begin < 15 && olat__is_digit(name[begin - 1]);) begin--;
     double value = begin < end ? 0 : -1;
     for (; begin < end; begin++) value = 10 * value + (name[begin] - '0');
     return value;
@@ -237,12 +274,15 @@ static int place_lamps(job *j, char error[512]) {
     int failed = !count && olat__fail(error, "--lamp %.200s: no photograph's name begins so; one is %.160s",
                                       j->given[LAMP], images[j->images[0]].name);
     if (j->given[LAMP]) qsort(lamps, (size_t)count, sizeof *lamps, by_number);
-    for (int i = 1; i < count && j->given[LAMP] && !failed; i++) {
+    for (int i = 0; i < count && j->given[LAMP] && !failed; i++) {
+        if (lamps[i].number < 0)
+            failed = olat__fail(error, "%.160s has no number that tells which photographs belong to it",
+                                images[lamps[i].image].name);
+        if (!i) continue;
         const double apart = lamps[i].number - lamps[i - 1].number;
         if (!(apart > 0))
-            failed =
-                olat__fail(error, "%.160s and %.160s have the same number, or none: which is the lamp's?",
-                           images[lamps[i - 1].image].name, images[lamps[i].image].name);
+            failed = olat__fail(error, "%.160s and %.160s have the same number: which is the lamp's?",
+                                images[lamps[i - 1].image].name, images[lamps[i].image].name);
         step = fmin(step, apart);
     }
     for (int i = 0; i < j->all.count && !failed; i++) {
@@ -252,16 +292,14 @@ static int place_lamps(job *j, char error[512]) {
         double before = 0; /* the share of the lamp before it */
         int at = 0;
         while (at < count && (own ? lamps[at].image != image : lamps[at].number < number)) at++;
-        int found = at < count && (own || lamps[at].number <= number);
-        if (!found && at > 0 && at < count && floor(j->shift) < j->shift) {
+        const int numbered = own || number_of(images[image].name) >= 0;
+        int found = numbered && at < count && (own || lamps[at].number <= number);
+        if (!found && numbered && at > 0 && at < count && floor(j->shift) < j->shift) {
             const double apart = lamps[at].number - lamps[at - 1].number;
             before = (lamps[at].number - number) / apart;
             found = apart <= step;
         }
-        if (!found) {
-            free(frame.file), free(frame.mask);
-            continue;
-        }
+        if (!found) continue;
         frame.light.kind = SSDGS_LIGHT_POINT;
         for (int c = 0; c < 3; c++) {
             const double first = before > 0 ? lamps[at - 1].place[c] : 0;
@@ -295,6 +333,7 @@ static int save_list(const job *j, int test, char error[512]) {
     for (int i = 0; i < j->all.count; i++)
         if (in_test(i) == test) part.frames[part.count++] = j->all.frames[i];
     snprintf(path, sizeof path, "%.2000s/transforms_%s.json", j->given[OUTPUT], test ? "test" : "train");
+    if (!part.count) remove(path); /* an earlier one would be of other photographs */
     const int failed = part.count && olat_save(path, j->given[OUTPUT], &part, error);
     free(part.frames);
     return failed;
@@ -455,18 +494,20 @@ static int run(job *j, char error[512]) {
     static const char *const files[3] = {"cameras", "images", "points3D"};
     static const char *const lists[2] = {"transforms_train.json", "transforms_test.json"};
     char path[OLAT__MAX_PATH];
-    if (load_model(j, error) || olat_make_folder(j->given[OUTPUT], error)) return 1;
+    if (load_model(j, error)) return 1;
     for (int i = 0; i < 6; i++) {
-        snprintf(path, sizeof path, "%.2000s/%s.%s", j->model_folder, files[i / 2], i % 2 ? "txt" : "bin");
+        snprintf(path, sizeof path, "%.3000s/%s.%s", j->loaded, files[i / 2], i % 2 ? "txt" : "bin");
         if (olat_guard_input(&j->guard, path, error)) return 1;
     }
-    if (take_photographs(j, error)) return 1;
+    if (find_photographs(j, error) || place_lamps(j, error) || olat_make_folder(j->given[OUTPUT], error))
+        return 1;
     for (int i = 0; i < 2; i++) {
         snprintf(path, sizeof path, "%.2000s/%s", j->given[OUTPUT], lists[i]);
         if (olat_guard_output(&j->guard, path, error)) return 1;
     }
+    if (copy_photographs(j, error)) return 1;
     if (ssdgs_context_create(NULL, &j->context)) return olat__fail(error, "out of memory");
-    if (place_lamps(j, error) || save(j, error) || look(j, error) || save(j, error)) return 1;
+    if (save(j, error) || look(j, error) || save(j, error)) return 1;
     int tests = 0;
     for (int i = 0; i < j->all.count; i++) tests += in_test(i);
     const double(*box)[3] = (const double(*)[3])j->all.bounds;
@@ -501,7 +542,7 @@ int main(int argc, char **argv) {
         else if (j.model_folder) return usage("a second model:", argv[i]);
         else j.model_folder = argv[i];
     }
-    if (!j.model_folder || !j.given[IMAGES] || !j.given[OUTPUT])
+    if (!j.model_folder || !j.given[IMAGES] || !j.given[OUTPUT] || !*j.given[OUTPUT])
         return usage("needs a MODEL, --images DIR and", "-o DATASET");
     if (j.given[SHIFT] && !j.given[LAMP]) return usage("--shift goes with", "--lamp");
     if (j.given[SHIFT] && !olat_argument(j.given[SHIFT], &j.shift))
@@ -514,6 +555,9 @@ int main(int argc, char **argv) {
         at += length + 1;
     }
     const int failed = run(&j, error) && fail(error);
+    for (int i = 0; i < 2 * j.model.image_count && j.sources; i++)
+        free(j.sources[i / 2].from[i % 2]), free(j.sources[i / 2].to[i % 2]);
+    free(j.sources);
     colmap_free(&j.model);
     olat_free(&j.all);
     olat_guard_free(&j.guard);

@@ -97,6 +97,13 @@ static void colmap__end_line(colmap__file *f) {
     f->at = f->line_end + (f->line_end < f->size);
 }
 
+/* Passes over a number that is not used, whatever it is. */
+static void colmap__skip(colmap__file *f) {
+    if (f->binary) (void)colmap__bytes(f, 8);
+    else if (!colmap__word(f)) colmap__bad(f, "a number was expected");
+    while (!f->binary && f->at < f->line_end && !strchr(" \t\r", f->bytes[f->at])) f->at++;
+}
+
 /* A number of text, or the 8 bytes of a double. */
 static double colmap__real(colmap__file *f) {
     double value = 0;
@@ -127,8 +134,8 @@ static int64_t colmap__whole(colmap__file *f, int bytes) {
 }
 
 /* Opens folder/name.bin, or .txt. 1: failed, where there must be one, or it cannot be read. */
-static int colmap__open(colmap__file *f, const char *folder, const char *name, size_t least, int optional,
-                        char *path, char *error) {
+static int colmap__open(colmap__file *f, const char *folder, const char *name, int optional, char *path,
+                        char *error) {
     struct stat there;
     memset(f, 0, sizeof *f);
     f->path = path;
@@ -143,11 +150,8 @@ static int colmap__open(colmap__file *f, const char *folder, const char *name, s
                        : olat__fail(error, "%s/%s: there is no .bin and no .txt", olat__tail(folder), name);
     }
     if (olat__read_file(path, &f->bytes, &f->size, error)) return f->failed = 1;
-    if (f->binary) {
-        f->left = colmap__bytes(f, 8);
-        if (!f->failed && f->left > (f->size - 8) / least)
-            colmap__bad(f, "more records than the file has room for");
-    }
+    if (f->binary) f->left = colmap__bytes(f, 8);
+    else if (f->size > 2 && !memcmp(f->bytes, "\xEF\xBB\xBF", 3)) f->at = 3; /* an editor's byte order mark */
     return f->failed;
 }
 
@@ -320,7 +324,7 @@ static void colmap__point(colmap__file *f, colmap_model *m, const int *by_id) {
         if (v < 0 || v > 255) colmap__bad(f, "a colour of 0 to 255 was expected");
         point.color[i] = (unsigned char)v;
     }
-    (void)colmap__real(f); /* its error */
+    colmap__skip(f); /* its error */
     uint64_t left = f->binary ? colmap__bytes(f, 8) : 0;
     if (f->binary && !f->failed && left > (f->size - f->at) / 8)
         colmap__bad(f, "more images than the file has room for");
@@ -358,7 +362,7 @@ OLAT__API int colmap_load(const char *folder, colmap_model *m, char error[512]) 
     int failed = strlen(folder) + 32 > sizeof path &&
                  olat__fail(error, "%s: the path is too long", olat__tail(folder));
     if (!failed) {
-        failed = colmap__open(&f, folder, "cameras", 24, 0, path, error);
+        failed = colmap__open(&f, folder, "cameras", 0, path, error);
         while (!failed && colmap__next(&f)) {
             colmap__camera(&f, m);
             if (!f.binary && !f.failed) colmap__end_line(&f);
@@ -367,7 +371,7 @@ OLAT__API int colmap_load(const char *folder, colmap_model *m, char error[512]) 
         free(f.bytes);
     }
     if (!failed) {
-        failed = colmap__open(&f, folder, "images", 73, 0, path, error);
+        failed = colmap__open(&f, folder, "images", 0, path, error);
         while (!failed && colmap__next(&f)) colmap__image(&f, m);
         failed |= f.failed;
         free(f.bytes);
@@ -387,7 +391,7 @@ OLAT__API int colmap_load(const char *folder, colmap_model *m, char error[512]) 
     }
     if (!failed) {
         qsort(by_id, (size_t)m->image_count, 2 * sizeof *by_id, colmap__by_first);
-        failed = colmap__open(&f, folder, "points3D", 43, 1, path, error);
+        failed = colmap__open(&f, folder, "points3D", 1, path, error);
         while (!failed && colmap__next(&f)) colmap__point(&f, m, by_id);
         failed |= f.failed;
         free(f.bytes);

@@ -522,7 +522,7 @@ static const char *olat__jpeg_read(olat__jpeg *j) {
         }
         const unsigned char *p = j->bytes + j->at;
         const size_t length = !marker || left < 4 ? left : (size_t)(p[2] << 8 | p[3]);
-        if (length > left - 2) return "the file ends early";
+        if (!marker || length > left - 2) return "the file ends early";
         if (length < 2) return "a segment that is shorter than its length";
         const size_t size = length - 2, after = j->at + 2 + length;
         p += 4;

@@ -362,11 +362,13 @@ static void olat__read_camera(olat__json *j, const olat__node *node, const olat_
     ssdgs_camera *camera = &frame->camera;
     olat_lens *of = &frame->lens;
     const int width = of->width, height = of->height, fits = olat__lens_of(lens, width, height, of);
-    if (!fits) olat__json_fail(j, node, "the image has %d x %d pixels, not w x h", width, height);
+    if (!fits)
+        olat__json_fail(j, node, "the image has %d x %d pixels, not w x h%s%s", width, height,
+                        frame->file ? ": " : "", frame->file ? olat__tail(frame->file) : "");
     else if (!(of->focal[0] > 0))
         olat__json_fail(j, node, "camera_angle_x, camera_intrinsics or fl_x is missing");
     else if (!olat_lens_zoom(of))
-        olat__json_fail(j, node, "the lens's k1 .. p2 leave no picture: are they of this camera?");
+        olat__json_fail(j, node, "the lens's centre or k1 .. p2 leave no picture: are they of this camera?");
     else if (width < downscale || height < downscale)
         olat__json_fail(j, node, "%d x %d pixels are too few to be made %d times smaller", width, height,
                         downscale);
@@ -711,7 +713,7 @@ static int olat__reshape(const olat__reading *r, int i, olat__found *found, char
     if (!reshaped) return olat__fail(error, "%s: out of memory", olat__tail(frame->file));
     free(frame->pixels);
     frame->pixels = reshaped;
-    if (bends) olat__tell(found, 0, "made straight where its lens bends lines");
+    if (bends) olat__tell(found, 0, "made straight, as the lens bends lines");
     return 0;
 }
 
