@@ -1045,14 +1045,14 @@ OLAT__API int olat_load(const char *folder, const char *split_json, int flags, o
 }
 
 /* What the photographs of a list take in memory, in bytes, the pixels of one, and how many of them are not
-   transparent, judged by the first one without its mask. */
+   transparent, judged by the first one without its mask; and what each thread takes that reads one. */
 OLAT__API int olat_memory(const char *folder, const char *split_json, int flags, double *bytes,
-                          double *pixels, double *shown, char error[512]) {
+                          double *pixels, double *shown, double *reading, char error[512]) {
     olat__json j;
     olat__json_open(&j, folder, split_json, error);
     const olat__node *frames = j.failed ? NULL : olat__find(&j, j.nodes, "frames");
     char *files[2] = {NULL, NULL};
-    *bytes = *pixels = *shown = 0;
+    *bytes = *pixels = *shown = *reading = 0;
     if (frames && frames->size) /* what is wrong with the list is told when it is read */
         olat__read_paths(&j, &j.nodes[frames->child], folder, flags, &files[0], &files[1]);
     if (files[0] && !j.failed) {
@@ -1066,6 +1066,13 @@ OLAT__API int olat_memory(const char *folder, const char *split_json, int flags,
             const int times = flags >> 8 ? flags >> 8 : 1;
             *pixels = (double)(width / times) * (height / times);
             *bytes = 4 * (double)olat__number_size(format) * frames->size * *pixels;
+            olat__lens lens;
+            memset(&lens, 0, sizeof lens);
+            olat__read_lens(&j, j.nodes, &lens);
+            olat__read_lens(&j, &j.nodes[frames->child], &lens);
+            *reading =
+                (double)width * height *
+                (8 * (double)olat__number_size(format) + (times > 1 || olat_lens_bends(&lens.bend) ? 16 : 0));
             for (size_t i = 0; i < (size_t)width * (size_t)height; i++)
                 *shown += (double)olat__number(image, format, 4 * i + 3) / (times * times);
             free(image);

@@ -296,7 +296,7 @@ typedef struct run {
     int first, drawn_at, percent; /* iteration of the first call and of the last line; last 5% step written */
     double start, drawn, speed, psnr;
     double best;       /* PSNR of the photographs held out */
-    int best_at;       /* its iteration; -1: none yet */
+    int best_at;       /* its iteration; 0: before this run went on, -1: none yet */
     view_server *view; /* who watches; NULL */
 } run;
 
@@ -366,7 +366,7 @@ typedef struct job {
     corners bounds;
     ssdgs_context_desc desc;
     run progress;
-    char *checkpoint, *refined; /* paths, and NULL where none is written */
+    char *checkpoint, *refined, *best; /* paths, and NULL where none is written */
     olat_guard guard;
     olat_dataset train_set, test_set;
     ssdgs_photo *photos, *test_photos;
@@ -519,14 +519,14 @@ static void print_peak_memory(void) {
 /* No output may be one of the dataset's files, and all must be writable: better known now than after hours of
    training. */
 static int check_outputs(job *j, const char *train_json, char error[512]) {
-    const char *const outputs[3] = {j->given[OUTPUT], j->checkpoint, j->refined};
+    const char *const outputs[4] = {j->given[OUTPUT], j->checkpoint, j->refined, j->best};
     if (j->given[REFIT] && olat_guard_input(&j->guard, j->given[REFIT], error)) return 1;
     if (olat_guard_folder(&j->guard, j->dataset, train_json, error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_train.json", error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_test.json", error) ||
         olat_guard_folder(&j->guard, j->dataset, "transforms_valid.json", error))
         return 1;
-    for (int i = 0; i < 3; i++)
+    for (int i = 0; i < 4; i++)
         if (outputs[i] &&
             (olat_guard_output(&j->guard, outputs[i], error) || olat_check_writable(outputs[i], error)))
             return 1;
@@ -574,28 +574,34 @@ static int save_refined(job *j, char error[512]) {
 /* Says what memory the run takes, before it is taken; the first photograph stands for all. */
 static int tell_memory(const job *j, const char *train_json, int has_test, char error[512]) {
     const double million = 1e6;
-    double photographs = 0, pixels = 0, shown = 0;
+    const int threads = ssdgs_context_threads(j->context);
+    double photographs = 0, pixels = 0, shown = 0, reading = 0;
     for (int s = 0; s <= has_test; s++) {
-        double bytes, size, not_clear;
+        double bytes, size, not_clear, at_work;
         if (olat_memory(j->dataset, s ? "transforms_test.json" : train_json, OLAT_DOWNSCALE(j->downscale),
-                        &bytes, &size, &not_clear, error))
+                        &bytes, &size, &not_clear, &at_work, error))
             return 1;
         photographs += bytes;
         pixels = fmax(pixels, size);
         shown = fmax(shown, not_clear);
+        reading = fmax(reading, at_work);
     }
     const double gaussians = j->options.max_gaussians ? j->options.max_gaussians : fmin(50000, 0.375 * shown),
                  step = BYTES_A_PIXEL * pixels,
-                 model = BYTES_A_GAUSSIAN * gaussians * (double)j->options.surplus,
-                 all = photographs + step + model + 30 * million;
-    fprintf(stderr,
-            "memory: about %.0f MB, %.0f of them for the photographs, %.0f for a step, %.0f for Gaussians",
-            all / million, photographs / million, step / million, model / million);
-    fprintf(stderr,
-            all < 2000 * million         ? "\n"
-            : model > photographs + step ? "; --max-gaussians %.0f would halve it\n"
-                                         : "; --downscale %.0f would take less than half\n",
-            model > photographs + step ? gaussians / 3 : 2.0 * (j->downscale ? j->downscale : 1));
+                 model = BYTES_A_GAUSSIAN * gaussians * (double)j->options.surplus, running = step + model,
+                 decoding = reading * threads, all = photographs + fmax(running, decoding) + 30 * million;
+    fprintf(stderr, "memory: about %.0f MB, %.0f of them for the photographs", all / million,
+            photographs / million);
+    if (decoding > running)
+        fprintf(stderr, ", %.0f while %d threads read them\n", decoding / million, threads);
+    else {
+        fprintf(stderr, ", %.0f for a step, %.0f for Gaussians", step / million, model / million);
+        fprintf(stderr,
+                all < 2000 * million         ? "\n"
+                : model > photographs + step ? "; --max-gaussians %.0f would halve it\n"
+                                             : "; --downscale %.0f would take less than half\n",
+                model > photographs + step ? gaussians / 3 : 2.0 * (j->downscale ? j->downscale : 1));
+    }
     return 0;
 }
 
@@ -631,30 +637,53 @@ static ssdgs_result score(const job *j, ssdgs_model *model, double *psnr) {
     return result;
 }
 
-/* Judges the model as it is; where it is the best so far it becomes the output. */
+/* Judges the model as it is; the best so far lies beside the output. */
 static ssdgs_result judge(job *j) {
     run *r = &j->progress;
     double psnr;
     ssdgs_result result = score(j, j->model, &psnr);
     const int best = r->best_at < 0 || psnr > r->best;
-    if (!result && best) result = ssdgs_model_save(j->model, j->given[OUTPUT]);
+    if (!result && best) result = ssdgs_model_save(j->model, j->best);
     if (result) return result;
     if (best) r->best = psnr, r->best_at = r->done;
     fprintf(stderr, "%sheld out: PSNR %.2f after %d iterations%s\n", r->terminal ? "\n" : "", psnr, r->done,
-            best ? ", kept" : "");
+            best ? ", the best so far" : "");
     return SSDGS_OK;
 }
 
-/* A run that goes on has kept its best model, which is judged anew. */
+/* A run that goes on has left its best model, which is judged anew; one that begins has none. */
 static ssdgs_result judge_kept(job *j) {
     ssdgs_model *kept = NULL;
     run *r = &j->progress;
-    ssdgs_result result = SSDGS_OK;
-    if (olat_exists(j->given[OUTPUT])) result = ssdgs_model_load(j->context, j->given[OUTPUT], &kept, NULL);
-    if (kept && !result) result = score(j, kept, &r->best);
-    if (kept && !result) r->best_at = 0;
+    r->best_at = -1;
+    if (!olat_exists(j->best)) return SSDGS_OK;
+    if (!j->given[RESUME]) return remove(j->best), SSDGS_OK;
+    ssdgs_result result = ssdgs_model_load(j->context, j->best, &kept, NULL);
+    if (!result) result = score(j, kept, &r->best);
+    if (!result) {
+        r->best_at = 0;
+        fprintf(stderr, "held out: PSNR %.2f so far at best\n", r->best);
+    }
     ssdgs_model_destroy(kept);
     return result;
+}
+
+/* The best model becomes the output. */
+static int keep_best(const job *j, char error[512]) {
+    unsigned char *bytes = NULL;
+    size_t size = 0;
+    const int failed = olat__read_file(j->best, &bytes, &size, error) ||
+                       olat__write_file(j->given[OUTPUT], bytes, size, error);
+    free(bytes);
+    if (failed) return 1;
+    remove(j->best);
+    if (j->progress.best_at == j->progress.done)
+        printf("%s: the last model scores best on", j->given[OUTPUT]);
+    else if (j->progress.best_at > 0)
+        printf("%s: that after %d iterations scores best on", j->given[OUTPUT], j->progress.best_at);
+    else printf("%s: one from before the run went on scores best on", j->given[OUTPUT]);
+    printf(" the photographs held out, %.2f\n", j->progress.best);
+    return 0;
 }
 
 /* Opens the page that shows the model as it trains. */
@@ -695,15 +724,16 @@ static int train(job *j) {
     double start = olat_seconds();
     j->checkpoint = (char *)malloc(strlen(output) + 8);
     if (refines) j->refined = (char *)malloc(strlen(output) + 16);
-    if (!j->checkpoint || !test_json || (refines && !j->refined))
+    if (j->given[KEEP_BEST]) j->best = (char *)malloc(strlen(output) + 8);
+    if (!j->checkpoint || !test_json || (refines && !j->refined) || (j->given[KEEP_BEST] && !j->best))
         return free(test_json), fail("out of memory");
     sprintf(j->checkpoint, "%s.ckpt", output);
     if (refines) sprintf(j->refined, "%s.refined.json", output);
+    if (j->best) sprintf(j->best, "%s.best", output);
     sprintf(test_json, "%s/transforms_test.json", j->dataset);
     const int has_test = olat_exists(test_json);
     free(test_json);
-    if (check_outputs(j, train_json, error) || tell_memory(j, train_json, has_test, error))
-        return fail(error);
+    if (check_outputs(j, train_json, error)) return fail(error);
 
     if (j->given[VIEW]) {
         j->desc.tracer.stage = view_stage;
@@ -711,6 +741,7 @@ static int train(job *j) {
     }
     ssdgs_result result = ssdgs_context_create(&j->desc, &j->context);
     if (result) return fail(ssdgs_result_string(result));
+    if (tell_memory(j, train_json, has_test, error)) return fail(error);
     double origin[3] = {0, 0, 0};
     if (j->given[REFIT]) {
         if (ssdgs_model_load(j->context, j->given[REFIT], &j->model, NULL))
@@ -759,10 +790,14 @@ static int train(job *j) {
         return fail_of(j);
     fprintf(stderr, "%s: %d photographs of %dx%d; %d threads, %s\n", j->dataset, j->train_set.count, width,
             height, ssdgs_context_threads(j->context), ssdgs_isa_string(ssdgs_context_isa(j->context)));
-    j->progress.best_at = -1;
-    if (j->given[RESUME] &&
-        (ssdgs_trainer_load(j->trainer, j->checkpoint) || (j->given[KEEP_BEST] && judge_kept(j))))
-        return fail_of(j);
+    if (j->given[RESUME]) {
+        if (ssdgs_trainer_load(j->trainer, j->checkpoint)) return fail_of(j);
+        if (!ssdgs_checkpoint_iteration(j->context, j->checkpoint, &j->progress.done, NULL) &&
+            j->progress.done >= j->options.iterations)
+            fprintf(stderr, "train: note: %d iterations are done already: --iterations asks for no more\n",
+                    j->progress.done);
+    }
+    if (j->best && judge_kept(j)) return fail_of(j);
 
     if (j->given[VIEW] && watch(j, error)) return fail(error);
     j->progress.iterations = j->options.iterations;
@@ -771,8 +806,7 @@ static int train(job *j) {
     j->progress.first = -1;
     signal(SIGINT, on_interrupt);
     while ((result = ssdgs_trainer_run(j->trainer, progress, &j->progress)) == SSDGS_ERR_CANCELLED) {
-        if (j->given[KEEP_BEST] && is_due(&j->progress, j->progress.judge_every, j->progress.done) &&
-            judge(j))
+        if (j->best && is_due(&j->progress, j->progress.judge_every, j->progress.done) && judge(j))
             return fail(ssdgs_error_message(j->context));
         if (!interrupted && !is_due(&j->progress, j->progress.checkpoint_every, j->progress.done)) continue;
         if (j->progress.done < j->progress.kept) {
@@ -792,12 +826,13 @@ static int train(job *j) {
     signal(SIGINT, SIG_DFL);
     view_close(&j->view);
     if (result) return fail_of(j);
-    const int saved = !(j->given[KEEP_BEST] ? judge(j) : ssdgs_model_save(j->model, output));
+    const int saved = !(j->best ? judge(j) : ssdgs_model_save(j->model, output));
     if (!saved) fail(ssdgs_error_message(j->context));
     if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
     if (!saved)
         return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint),
                fail(error);
+    if (j->best && keep_best(j, error)) return fail(error);
     char text[32];
     if (refines && save_refined(j, error)) return fail(error);
     ssdgs_trainer_destroy(j->trainer); /* what is tested is what the file holds */
@@ -809,6 +844,12 @@ static int train(job *j) {
            clock_text(olat_seconds() - start, text));
     print_peak_memory();
     printf("\n");
+    if (j->options.max_gaussians && ssdgs_model_peek(j->model).count > j->options.max_gaussians)
+        fprintf(
+            stderr,
+            "train: note: these are more than --max-gaussians %d: density control had ended. --refit merges "
+            "them\n",
+            j->options.max_gaussians);
     if (j->options.refine & SSDGS_REFINE_AMBIENT) tell_ambient(ssdgs_model_settings(j->model));
     if (!has_test) return 0;
     j->test_photos = olat_photos(&j->test_set);
@@ -841,5 +882,6 @@ int main(int argc, char **argv) {
     olat_guard_free(&j.guard);
     free(j.checkpoint);
     free(j.refined);
+    free(j.best);
     return status;
 }

@@ -168,10 +168,17 @@ again() { train -o "$out/again.ply" "$@"; }
 check "a run" says 0 "^test: PSNR" again --iterations 25
 check "a shorter one in its place" says 0 "^test: PSNR" again --iterations 20
 check "goes on longer, and tells" says 0 "note: .*again.ply.ckpt: iterations was 20 in its run and is 30 now" again --iterations 30 --resume
-check "holds photographs out" says 0 "held out: PSNR [0-9.]* after 2 iterations, kept" again --keep-best
+best() { train -o "$out/best.ply" --keep-best "$@"; }
+echo "an older run's" >"$out/best.ply.best"
+check "holds photographs out" says 0 "held out: PSNR [0-9.]* after 2 iterations, the best so far" best
 check "the last score is told" grep -q "held out: PSNR [0-9.]* after 40 iterations" "$out/log"
-check "it goes on with those" says 0 "held out: PSNR [0-9.]* after 44 iterations" again --keep-best --iterations 44 --resume
-check "others are not those of its run" says 1 "its run had 11 photographs, this one has 12" again --resume
+check "and which is kept" grep -q "best.ply: .* scores best on the photographs held out, [0-9.]*$" "$out/log"
+check "no other file stays" test ! -e "$out/best.ply.best"
+cp "$out/best.ply" "$out/best.ply.best"
+check "it goes on with those" says 0 "held out: PSNR [0-9.]* so far at best" best --iterations 44 --resume
+check "to the end" grep -q "held out: PSNR [0-9.]* after 44 iterations" "$out/log"
+check "no more" says 0 "note: 44 iterations are done already" best --iterations 10 --resume
+check "others are not those of its run" says 1 "its run had 11 photographs, this one has 12" train -o "$out/best.ply" --iterations 44 --resume
 check "smaller photographs" says 0 "tiny: 12 photographs of 42x42" again --downscale 3
 check "and of those its pictures" says 0 "^test: PSNR" "$build/relight" "$out/again.ply" "$set" --out "$out/small" --downscale 3
 check "of that size" test "$(od -An -tu1 -j19 -N1 "$(ls "$out"/small/*.png | head -n 1)")" -eq 42
