@@ -89,7 +89,7 @@ $(BUILD)/builds.log: %.log: $(OBJECTS) $(BUILD)/gpu_shaders.h
 	@sh tests/builds.sh $(BUILD) $(COMPILE) -O0 $(KEEP_LOG)
 $(BUILD)/shown.log: %.log: | $(BUILD)
 	@sh tests/shown.sh $(KEEP_LOG)
-$(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/show
+$(BUILD)/examples.log: %.log: $(BUILD)/view $(BUILD)/train $(BUILD)/relight $(BUILD)/engine $(BUILD)/export $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/colmap $(BUILD)/show
 	@sh tests/examples.sh $(BUILD) $(KEEP_LOG)
 
 test-browser: $(BUILD)/view $(BUILD)/train $(BUILD)/relight ## examples/view.html in headless Chromium, and make web's page where emscripten is; needs node and chromium

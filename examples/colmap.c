@@ -77,7 +77,17 @@ static int load_model(job *j, char error[512]) {
     char folder[OLAT__MAX_PATH], list[256] = "";
     int models = 0, best = 0, failed = 0;
     snprintf(j->loaded, sizeof j->loaded, "%.3000s", j->model_folder);
-    if (has_model(j->loaded)) return colmap_load(j->loaded, &j->model, error);
+    if (has_model(j->loaded)) {
+        uint64_t ids[2][2];
+        for (int i = 0; i < 100 && olat__identify(j->loaded, ids[0]); i++) {
+            snprintf(folder, sizeof folder, "%.3000s/../%d", j->loaded, i);
+            if (!has_model(folder) || !olat__identify(folder, ids[1]) || !memcmp(ids[0], ids[1], sizeof *ids))
+                continue;
+            olat__append(list, sizeof list, "%s%d", *list ? ", " : "", i);
+        }
+        if (*list) note("beside this model lie others that could not be joined with it (%s): not used", list);
+        return colmap_load(j->loaded, &j->model, error);
+    }
     for (int b = 0; b < 2 && !models; b++)
         for (int i = -1; i < 100 && !failed; i++) {
             colmap_model next;

@@ -201,6 +201,20 @@ echo "somebody's notes" >"$out/notes.ply.ckpt"
 check "no checkpoint" says 1 "it is not a checkpoint, and would be replaced" "$build/train" "$set" -o "$out/notes.ply" --iterations 1
 check "it stays" grep -q somebody "$out/notes.ply.ckpt"
 
+# COLMAP's models
+mkdir -p "$out/sparse/0" "$out/sparse/1" "$out/photos/A"
+cp tests/golden/colmap/*.txt "$out/sparse/0"
+sed '/A_000/,$d' tests/golden/colmap/images.txt >"$out/sparse/1/images.txt"
+cp tests/golden/colmap/cameras.txt "$out/sparse/1"
+of_colmap() { "$build/colmap" "$@" --images "$out/photos" -o "$out/of_colmap"; }
+check "no photographs" says 1 "none of the 56 photographs is there, as A/A_000.png" of_colmap "$out/sparse/0"
+cp "$set/train/$(ls "$set/train" | head -n 1)" "$out/photos/A/A_000.png"
+check "of another size" says 1 "the image has 128 x 128 pixels, not w x h: .*A_000.png" of_colmap "$out/sparse/0"
+check "a model beside it" grep -q "note: beside this model lie others that could not be joined with it (1): not used" "$out/log"
+check "photographs that are not there" grep -q "note: 55 of the 56 photographs in the model are not in $out/photos: left out" "$out/log"
+check "the largest of several" says 1 "note: 2 models could not be joined (photographs of each: 0: 56, 1: [0-9]*): model 0 is used" of_colmap "$out/sparse"
+check "colmap --help" says 0 "where the LED is beside the lamp's lens" "$build/colmap" --help
+
 # an edited model, and its networks back
 check "whole" says 0 "4 images" relight --out "$out/whole"
 LC_ALL=C sed '/^element ssdgs_settings 1$/,/^end_header$/{/^end_header$/!d;}' "$model" >"$out/edited.ply"

@@ -929,7 +929,7 @@ static void test_checkpoints(void) {
             {"precision", offsetof(head, real_size), WORD, 2},
             {"seed", offsetof(head, options.seed), WORD, 1},
             {"background", offsetof(head, options.background[2]), REAL, nan_value},
-            {"rate", offsetof(head, options.rates.light.end), REAL, infinite},
+            {"dssim", offsetof(head, options.dssim), REAL, infinite},
             {"camera", hashes, WORD, 1},
             {"lights", hashes + offsetof(ssdgs__checkpoint_photo, lights), WORD, 1},
             {"pixels", parameters - sizeof(uint64_t), WORD, 1},
@@ -1009,9 +1009,9 @@ static void test_checkpoints(void) {
     const ssdgs_train_options other = options;
     settings = small_settings(8);
     static const char *const told[14] = {"seed was ",
-                                         "iterations was ",
-                                         "rates.position.end was ",
-                                         "rates.light.end was ",
+                                         "batch was ",
+                                         "finish was ",
+                                         "bounds_max[2] was ",
                                          "densify_gradient was ",
                                          "scattering.width was 8 in its run and is 9 now",
                                          "transport was 1 in its run and is 0 now",
@@ -1028,9 +1028,9 @@ static void test_checkpoints(void) {
         memcpy(shots, photos, sizeof shots);
         options = other;
         if (i == 0) options.seed++;
-        if (i == 1) options.iterations++;
-        if (i == 2) options.rates.position.end = 0;
-        if (i == 3) options.rates.light.end *= 2;
+        if (i == 1) options.batch++;
+        if (i == 2) options.finish = 0;
+        if (i == 3) options.bounds_max[2] *= 2;
         if (i == 4) options.densify_gradient = 0;
         settings = small_settings(i == 5 ? 9 : 8);
         settings.transport = i != 6;
