@@ -895,7 +895,7 @@ SSDGS_API ssdgs_result ssdgs_trainer_refined(const ssdgs_trainer *trainer, int i
 #ifndef SSDGS_NO_STDIO
 /* A run's whole state: it goes on bit for bit. Load it into a trainer made with the same photographs, options
    and settings; else ERR_FORMAT names the first that differs. Only iterations, max_gaussians and rates may be
-   others, which the log tells: the rest of the run is then as one of these is from there on. */
+   others: the run goes on as if it had had them at its iteration, and the log tells each. */
 SSDGS_API ssdgs_result ssdgs_trainer_save(const ssdgs_trainer *trainer, const char *path);
 SSDGS_API ssdgs_result ssdgs_trainer_load(ssdgs_trainer *trainer, const char *path);
 /* How far the run of a checkpoint had come, of how many iterations (may be NULL). ERR_IO without a file,
