@@ -56,7 +56,7 @@ OLAT__API int olat_lens_point(const olat_lens *lens, double x, double y, double 
 /* Whether the photograph has all of the picture's border, and that is no wider than 120 degrees. */
 static int olat__lens_holds(const olat_lens *lens, double zoom) {
     enum { STEPS = 64 };
-    const double size[2] = {lens->width, lens->height};
+    const double size[2] = {(double)lens->width, (double)lens->height};
     for (int i = 0; i < 4 * STEPS; i++) {
         const double along = (i % STEPS) / (double)STEPS, side = i / (2 * STEPS);
         const int axis = i / STEPS % 2;

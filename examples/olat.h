@@ -1150,8 +1150,9 @@ static void olat__write_frame(olat__writer *w, const olat_frame *frame, const do
         own.centre[0] = (double)camera->cx, own.centre[1] = (double)camera->cy;
     }
     const int bends = olat_lens_bends(&own);
-    const double lens[12] = {own.width, own.height, own.focal[0], own.focal[1], own.centre[0], own.centre[1],
-                             own.k[0],  own.k[1],   own.k[2],     own.k[3],     own.p[0],      own.p[1]};
+    const double lens[12] = {(double)own.width, (double)own.height, own.focal[0], own.focal[1],
+                             own.centre[0],     own.centre[1],      own.k[0],     own.k[1],
+                             own.k[2],          own.k[3],           own.p[0],     own.p[1]};
     if (bends)
         olat__write(w, own.fisheye ? "\"camera_model\": \"OPENCV_FISHEYE\", "
                                    : "\"camera_model\": \"OPENCV\", ");
