@@ -726,9 +726,9 @@ static void test_folders(void) {
         {FOLDER "/parts --images " FOLDER "/capture", NULL},
         {FOLDER "/parts --images " FOLDER "/capture -o " FOLDER "/no --nothing", NULL},
         {FOLDER "/parts --images", NULL}};
-    char *empty[] = {(char *)"colmap",   (char *)FOLDER "/parts",
-                     (char *)"--images", (char *)FOLDER "/capture",
-                     (char *)"-o",       (char *)""};
+    static char words[6][64] = {"colmap", FOLDER "/parts", "--images", FOLDER "/capture", "-o", ""};
+    char *empty[6];
+    for (int i = 0; i < 6; i++) empty[i] = words[i];
     CHECK(colmap_main(6, empty) == 2); /* a shell variable that is not set */
     for (size_t i = 0; i < sizeof refused / sizeof *refused; i++) {
         job j;
