@@ -21,7 +21,7 @@ OBJECTS = $(BUILD)/kernels.o $(BUILD)/ssdgs.o
 PROGRAM = $(COMPILE) $(if $(filter $<,$(INSIDE)),$(KERNELS) $(if $(filter tests/%,$<),-DSSDGS_STATIC),-DSSDGS__IMPLEMENTED)
 LINKED = $< $(filter-out $(if $(filter $<,$(INSIDE)),%/ssdgs.o),$(filter %.o,$^)) -o $@ $(LDLIBS)
 
-HEADERS = ssdgs.h $(wildcard examples/*.h) tests/test.h tests/scene.h tests/kernels.h
+HEADERS = ssdgs.h $(wildcard examples/*.h tests/*.h)
 EXAMPLES = $(BUILD)/train $(BUILD)/relight $(BUILD)/minimal $(BUILD)/engine $(BUILD)/export $(BUILD)/view $(BUILD)/check $(BUILD)/ball $(BUILD)/unbake $(BUILD)/colmap $(BUILD)/bench
 SOURCES = $(filter-out tests/t_gpu.c,$(wildcard tests/t_*.c)) # which is `make test-gpu`
 IN_DOUBLE = $(if $(SOURCES),$(shell awk 'FNR < 4 && /real64/ { print FILENAME }' $(SOURCES)))

@@ -12166,22 +12166,23 @@ static int ssdgs__may_change(const ssdgs__number *n) {
            !strcmp(n->name, "max_gaussians");
 }
 
-/* Compares a checkpoint's numbers with the trainer's. */
-static ssdgs_result ssdgs__checkpoint_numbers(ssdgs_context *context, const char *path,
+/* Compares a checkpoint's numbers with the trainer's: refuses those that may not change, or tells those that
+   have. */
+static ssdgs_result ssdgs__checkpoint_numbers(ssdgs_context *context, const char *path, int tells,
                                               const ssdgs__number *list, int count, const void *there,
                                               const void *here) {
     for (const ssdgs__number *n = list; n < list + count; n++)
         for (int i = 0; !i || i < n->count; i++) {
             const unsigned char *was = (const unsigned char *)there + ssdgs__number_at(n, i),
                                 *is = (const unsigned char *)here + ssdgs__number_at(n, i);
-            const char index[4] = {'[', (char)('0' + i), ']', 0};
-            if (!memcmp(was, is, ssdgs__number_size(n->type))) continue;
+            const char index[4] = {'[', (char)('0' + i), ']', 0}, *const at = n->count ? index : "";
+            if (!memcmp(was, is, ssdgs__number_size(n->type)) || ssdgs__may_change(n) != tells) continue;
             const double values[2] = {ssdgs__number_get(n->type, was), ssdgs__number_get(n->type, is)};
-            if (!ssdgs__may_change(n))
+            if (!tells)
                 return ssdgs__fail(context, SSDGS_ERR_FORMAT,
                                    "%s: %s%s was %g in its run and is %g now" SSDGS__ANOTHER, path, n->name,
-                                   n->count ? index : "", values[0], values[1]);
-            ssdgs__note(context, "%s: %s was %g in its run and is %g now", path, n->name, values[0],
+                                   at, values[0], values[1]);
+            ssdgs__note(context, "%s: %s%s was %g in its run and is %g now", path, n->name, at, values[0],
                         values[1]);
         }
     return SSDGS_OK;
@@ -12196,10 +12197,10 @@ static ssdgs_result ssdgs__checkpoint_same(const ssdgs_trainer *trainer, const c
     memcpy(was.centre, own->settings.centre, sizeof was.centre);
     was.length_unit = own->settings.length_unit;
     was.light_scale = own->settings.light_scale;
-    ssdgs_result result = ssdgs__checkpoint_numbers(context, path, ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS,
-                                                    &head->options, &own->options);
+    ssdgs_result result = ssdgs__checkpoint_numbers(context, path, 0, ssdgs__train_numbers,
+                                                    SSDGS__TRAIN_NUMBERS, &head->options, &own->options);
     if (!result)
-        result = ssdgs__checkpoint_numbers(context, path, ssdgs__settings, SSDGS__SETTING_COUNT, &was,
+        result = ssdgs__checkpoint_numbers(context, path, 0, ssdgs__settings, SSDGS__SETTING_COUNT, &was,
                                            &own->settings);
     if (result) return result;
     if (head->photo_count != own->photo_count)
@@ -12259,6 +12260,8 @@ static ssdgs_result ssdgs__trainer_load(ssdgs_trainer *trainer, const char *path
     if (!result) result = ssdgs__settings_of_file(context, path, &head.settings);
     if (!result) result = ssdgs__trainer_grow(trainer, (size_t)head.count);
     if (!result) {
+        ssdgs__checkpoint_numbers(context, path, 1, ssdgs__train_numbers, SSDGS__TRAIN_NUMBERS, &head.options,
+                                  &own.options);
         if (head.fused != own.fused)
             ssdgs__note(
                 context,

@@ -298,13 +298,13 @@ static int place_lamps(job *j, char error[512]) {
     for (int i = 0; i < j->all.count && !failed; i++) {
         olat_frame frame = j->all.frames[i];
         const int image = j->images[i], own = is_lamp(j, image);
-        const double number = number_of(images[image].name) + j->shift;
+        const double name_number = number_of(images[image].name), number = name_number + j->shift;
         double before = 0; /* the share of the lamp before it */
         int at = 0;
         while (at < count && (own ? lamps[at].image != image : lamps[at].number < number)) at++;
-        const int numbered = own || number_of(images[image].name) >= 0;
-        int found = numbered && at < count && (own || lamps[at].number <= number);
-        if (!found && numbered && at > 0 && at < count && floor(j->shift) < j->shift) {
+        const int paired = !own && name_number >= 0;
+        int found = at < count && (own || (paired && lamps[at].number <= number));
+        if (!found && paired && at > 0 && at < count && floor(j->shift) < j->shift) {
             const double apart = lamps[at].number - lamps[at - 1].number;
             before = (lamps[at].number - number) / apart;
             found = apart <= step;

@@ -165,39 +165,9 @@ static void olat__read_bend(olat__json *j, const olat__node *object, olat_lens *
         "full_opencv",    "simple_radial",         "radial",        "fisheye",
         "opencv_fisheye", "simple_radial_fisheye", "radial_fisheye"};
     static const char *const known[7] = {"k1", "k2", "k3", "k4", "p1", "p2", "is_fisheye"};
-    static const char *const others[] = {"k5",
-                                         "k6",
-                                         "k7",
-                                         "k8",
-                                         "k9",
-                                         "p3",
-                                         "p4",
-                                         "p5",
-                                         "p6",
-                                         "p7",
-                                         "p8",
-                                         "p9",
-                                         "s1",
-                                         "s2",
-                                         "s3",
-                                         "s4",
-                                         "s5",
-                                         "s6",
-                                         "s7",
-                                         "s8",
-                                         "s9",
-                                         "b1",
-                                         "b2",
-                                         "skew",
-                                         "ftheta_p0",
-                                         "ftheta_p1",
-                                         "ftheta_p2",
-                                         "ftheta_p3",
-                                         "ftheta_p4",
-                                         "distortion",
-                                         "distortion_params",
-                                         "distortion_coefficients",
-                                         "rolling_shutter"};
+    static const char others[] = "k5 k6 k7 k8 k9 p3 p4 p5 p6 p7 p8 p9 s1 s2 s3 s4 s5 s6 s7 s8 s9 b1 b2 skew "
+                                 "ftheta_p0 ftheta_p1 ftheta_p2 ftheta_p3 ftheta_p4 distortion "
+                                 "distortion_params distortion_coefficients rolling_shutter ";
     const olat__node *model = olat__find(j, object, "camera_model"), *wrong = NULL;
     for (int i = 0; i < 6; i++) {
         const olat__node *node = olat__find(j, object, known[i]);
@@ -212,8 +182,10 @@ static void olat__read_bend(olat__json *j, const olat__node *object, olat_lens *
         if (m == MODELS) wrong = model;
         else bend->fisheye = m >= FISHEYES;
     }
-    for (size_t i = 0; i < sizeof others / sizeof *others && !wrong; i++) {
-        const olat__node *node = olat__find(j, object, others[i]);
+    for (const char *word = others; *word && !wrong; word = strchr(word, ' ') + 1) {
+        char key[32];
+        snprintf(key, sizeof key, "%.*s", (int)strcspn(word, " "), word);
+        const olat__node *node = olat__find(j, object, key);
         if (node && olat__nonzero(j, node)) wrong = node;
     }
     const int beyond = bend->fisheye ? fabs(bend->p[0]) > 0 || fabs(bend->p[1]) > 0 : fabs(bend->k[3]) > 0;
@@ -1044,15 +1016,19 @@ OLAT__API int olat_load(const char *folder, const char *split_json, int flags, o
     return olat_load_at(folder, split_json, flags, NULL, NULL, out, error);
 }
 
-/* What the photographs of a list take in memory, in bytes, the pixels of one, and how many of them are not
-   transparent, judged by the first one without its mask; and what each thread takes that reads one. */
-OLAT__API int olat_memory(const char *folder, const char *split_json, int flags, double *bytes,
-                          double *pixels, double *shown, double *reading, char error[512]) {
+/* What the photographs of a list take in memory, judged by the first one without its mask. */
+typedef struct olat_need {
+    double bytes, reading; /* of all; of each thread that reads one */
+    double pixels, shown;  /* of one; those that are not transparent */
+} olat_need;
+
+OLAT__API int olat_memory(const char *folder, const char *split_json, int flags, olat_need *need,
+                          char error[512]) {
     olat__json j;
     olat__json_open(&j, folder, split_json, error);
     const olat__node *frames = j.failed ? NULL : olat__find(&j, j.nodes, "frames");
     char *files[2] = {NULL, NULL};
-    *bytes = *pixels = *shown = *reading = 0;
+    memset(need, 0, sizeof *need);
     if (frames && frames->size) /* what is wrong with the list is told when it is read */
         olat__read_paths(&j, &j.nodes[frames->child], folder, flags, &files[0], &files[1]);
     if (files[0] && !j.failed) {
@@ -1064,17 +1040,17 @@ OLAT__API int olat_memory(const char *folder, const char *split_json, int flags,
         j.failed = olat__image_file(files[0], 0, &width, &height, &format, &image, &found, error);
         if (!j.failed) {
             const int times = flags >> 8 ? flags >> 8 : 1;
-            *pixels = (double)(width / times) * (height / times);
-            *bytes = 4 * (double)olat__number_size(format) * frames->size * *pixels;
+            need->pixels = (double)(width / times) * (height / times);
+            need->bytes = 4 * (double)olat__number_size(format) * frames->size * need->pixels;
             olat__lens lens;
             memset(&lens, 0, sizeof lens);
             olat__read_lens(&j, j.nodes, &lens);
             olat__read_lens(&j, &j.nodes[frames->child], &lens);
-            *reading =
+            need->reading =
                 (double)width * height *
                 (8 * (double)olat__number_size(format) + (times > 1 || olat_lens_bends(&lens.bend) ? 16 : 0));
             for (size_t i = 0; i < (size_t)width * (size_t)height; i++)
-                *shown += (double)olat__number(image, format, 4 * i + 3) / (times * times);
+                need->shown += (double)olat__number(image, format, 4 * i + 3) / (times * times);
             free(image);
         }
     }

@@ -78,10 +78,9 @@ static const char *const help[] = {
     "                           MODEL.ply.refined.json, and even light from the room, into the model",
     "  --refit MODEL.ply        instead of a start from points: merges a trained model's Gaussians until",
     "                           --max-gaussians are left, and trains those for 1000 iterations",
-    "  --downscale N            photographs, masks and cameras N times smaller: the mean light of N x N "
-    "pixels",
-    "  --keep-best              holds every tenth photograph out and keeps the model that scores best on "
-    "those",
+    "  --downscale N            photographs, masks and cameras N times smaller: means of N x N pixels' light",
+    "  --keep-best              holds every tenth photograph out and keeps the model that scores best on",
+    "                           those, in MODEL.ply.best until the run ends",
     "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C and the end do; never",
     "  --view                   shows the model as it trains in the browser: prints the address to open",
     "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again. Only",
@@ -394,6 +393,7 @@ static int parse(job *j, int argc, char **argv) {
         if (option == SET) argv[sets++] = argv[i]; /* for later: they change what a preset has set */
     }
     if (!j->dataset || !given[OUTPUT]) return usage("needs a DATASET and", "-o MODEL.ply");
+    j->downscale = 1;
 
     if (!choose(given, PRESET, "default|published", &preset)) return usage("no such preset:", given[PRESET]);
     j->settings = preset ? ssdgs_settings_published() : ssdgs_settings_default();
@@ -577,14 +577,14 @@ static int tell_memory(const job *j, const char *train_json, int has_test, char 
     const int threads = ssdgs_context_threads(j->context);
     double photographs = 0, pixels = 0, shown = 0, reading = 0;
     for (int s = 0; s <= has_test; s++) {
-        double bytes, size, not_clear, at_work;
+        olat_need need;
         if (olat_memory(j->dataset, s ? "transforms_test.json" : train_json, OLAT_DOWNSCALE(j->downscale),
-                        &bytes, &size, &not_clear, &at_work, error))
+                        &need, error))
             return 1;
-        photographs += bytes;
-        pixels = fmax(pixels, size);
-        shown = fmax(shown, not_clear);
-        reading = fmax(reading, at_work);
+        photographs += need.bytes;
+        pixels = fmax(pixels, need.pixels);
+        shown = fmax(shown, need.shown);
+        reading = fmax(reading, need.reading);
     }
     const double gaussians = j->options.max_gaussians ? j->options.max_gaussians : fmin(50000, 0.375 * shown),
                  step = BYTES_A_PIXEL * pixels,
@@ -600,7 +600,7 @@ static int tell_memory(const job *j, const char *train_json, int has_test, char 
                 all < 2000 * million         ? "\n"
                 : model > photographs + step ? "; --max-gaussians %.0f would halve it\n"
                                              : "; --downscale %.0f would take less than half\n",
-                model > photographs + step ? gaussians / 3 : 2.0 * (j->downscale ? j->downscale : 1));
+                model > photographs + step ? gaussians / 3 : 2.0 * j->downscale);
     }
     return 0;
 }

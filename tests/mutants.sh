@@ -10,7 +10,7 @@ SSDGS_GOLDEN=${SSDGS_GOLDEN:-$PWD/tests/golden}
 export SSDGS_GOLDEN MUTANT
 
 cc=${CC:-cc} quick=$(command -v tcc || echo "$cc -O0") # where compiling takes longer than running
-cp tests/t_*.c tests/scene.h "$work/tests"
+cp tests/t_*.c tests/scene.h tests/meter.h "$work/tests"
 mkdir -p "$work/examples" && cp examples/*.[ch] "$work/examples" && ln -sfn "$PWD/examples/data" "$work/examples/data"
 # the first failed check ends a program
 sed 's/test_failed++, \(printf(.*)\);$/\1, exit(1);/' tests/test.h >"$work/tests/test.h"

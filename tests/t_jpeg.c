@@ -5,37 +5,7 @@
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "test.h"
-
-/* ---- memory that counts and fails on demand ---- */
-
-static long live, calls, fail_at; /* blocks; allocations so far; the one to refuse, 0 = none */
-
-static void *meter_clear(size_t count, size_t size) {
-    void *memory = ++calls == fail_at ? NULL : calloc(count, size ? size : 1);
-    live += memory != NULL;
-    return memory;
-}
-
-static void *meter_resize(void *old, size_t size) {
-    void *memory = ++calls == fail_at ? NULL : realloc(old, size);
-    live += memory && !old;
-    return memory;
-}
-
-static void meter_free(void *memory) {
-    live -= memory != NULL;
-    free(memory);
-}
-
-#define malloc(size) meter_clear(1, size)
-#define realloc(memory, size) meter_resize(memory, size)
-#define calloc(count, size) meter_clear(count, size)
-#define free(memory) meter_free(memory)
-#include "../examples/olat.h"
-#undef malloc
-#undef realloc
-#undef calloc
-#undef free
+#include "meter.h"
 
 #define FOLDER "build/t_jpeg_files"
 

@@ -289,6 +289,9 @@ static void test_changed(void) {
             CHECK(!ssdgs_model_create(context, NULL, 0, &model));
             CHECK(!ssdgs_trainer_create(model, photos, PHOTOS, &longer, &trainer));
             changes[0] = 0;
+            trainer->options.seed = 2; /* where it is refused nothing else is told */
+            CHECK(ssdgs_trainer_load(trainer, "build/t_train.ckpt") == SSDGS_ERR_FORMAT && !changes[0]);
+            trainer->options.seed = 1;
             CHECK(!ssdgs_trainer_load(trainer, "build/t_train.ckpt"));
             CHECK(!strcmp(changes,
                           "build/t_train.ckpt: iterations was 60 in its run and is 90 now\n"
