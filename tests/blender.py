@@ -194,7 +194,7 @@ def through(x, y, k1, k2, p1, p2): # OpenCV's lens: where a pinhole's picture go
     return x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x * x), y * radial + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
 
 @functools.lru_cache(2)
-def lens(size, f, k, finer=1.5, parts=3): # a pinhole's size and focal length, and where in its picture each part of each pixel looks
+def lens(size, f, k, finer=1.5, parts=2): # a pinhole's size and focal length, and where in its picture each part of each pixel looks
     (w, h), maps = size, []
     for part in range(parts * parts):
         x, y = np.meshgrid((np.arange(w) + (part % parts + .5) / parts - w / 2) / f, (np.arange(h) + (part // parts + .5) / parts - h / 2) / f)
@@ -202,7 +202,7 @@ def lens(size, f, k, finer=1.5, parts=3): # a pinhole's size and focal length, a
         for _ in range(20):
             distorted = through(u, v, *k)
             u, v = u + x - distorted[0], v + y - distorted[1]
-        maps.append((u * finer * f, v * finer * f))
+        maps.append(((u * finer * f).astype(np.float32), (v * finer * f).astype(np.float32)))
     wide = tuple(2 * int(max(abs(m[axis]).max() for m in maps)) + 4 for axis in (0, 1))
     return wide, finer * f, maps
 
@@ -223,10 +223,11 @@ def phones(a, s):
         wide, finer, maps = lens(a.size, f, k) if k else (a.size, f, None)
         def shot(samples, mask):
             s.view_layers[0].material_override, s.render.film_transparent, table.is_holdout = white if mask else None, mask, mask # unlit
-            values = pixels(s, part + '.exr', matrix, frame['lamp'], wide, 2 * math.atan(wide[0] / 2 / finer), samples, noise)
+            values = pixels(s, part + '.exr', matrix, frame['lamp'], wide, 2 * math.atan(wide[0] / 2 / finer), max(1, samples // 2) if k else samples, noise)
+            values = values[..., 3:] if mask else values[..., :3]
             return bent(values, maps) if maps else values
-        save(s, f"{a.out}/masks/{frame['mask']}", shot(16, True)[..., 3:], True, file_format='PNG', color_mode='BW', color_depth='8')
-        save(s, f'{part}.{a.format}', shot(max(1, a.samples // 2 if k else a.samples), False)[..., :3] * frame['exposure'], False, **FORMATS[a.format])
+        save(s, f"{a.out}/masks/{frame['mask']}", shot(16, True), True, file_format='PNG', color_mode='BW', color_depth='8')
+        save(s, f'{part}.{a.format}', shot(a.samples, False) * frame['exposure'], False, **FORMATS[a.format])
     for i in range(a.train):
         draw, turn = random.Random(f'{a.seed} {i}'), 2 * math.pi * i / a.train
         wave = lambda times, low, high: low + (high - low) * (.5 + .5 * math.sin(times * turn + a.seed))

@@ -2,7 +2,7 @@
 # usage: sh tests/capture.sh WORK [options of tests/blender.py]: renders a capture by two phones into WORK (blender.py says of what), lets
 # COLMAP find the cameras, from WORK/images alone, and says how far they are from the truth. What is there is not made again. COLMAP's
 # model: WORK/sparse/0, and as text beside it; PINHOLE cameras or, of photographs by a distorted lens, OPENCV, one of each phone. WORK/aligned:
-# the same in the truth's coordinates. Needs Blender, python3-numpy, COLMAP, and on two cores some hours.
+# the same in the truth's coordinates. Needs Blender, python3-numpy, COLMAP, and on two cores an hour or two.
 set -eu
 work=$1 here=$(dirname "$0")
 shift
@@ -17,7 +17,7 @@ if [ ! -f "$work/sparse/0/images.bin" ]; then
     mkdir "$work/sparse"
     model=$(python3 -c 'import json, sys; print(json.load(open(sys.argv[1]))["frames"][0]["model"])' "$work/truth.json")
     quiet colmap feature_extractor --database_path "$work/database.db" --image_path "$work/images" --ImageReader.camera_model "$model" \
-        --ImageReader.single_camera_per_folder 1 --SiftExtraction.use_gpu 0
+        --ImageReader.single_camera_per_folder 1 --SiftExtraction.use_gpu 0 --SiftExtraction.first_octave 0
     quiet colmap exhaustive_matcher --database_path "$work/database.db" --SiftMatching.use_gpu 0
     quiet colmap mapper --database_path "$work/database.db" --image_path "$work/images" --output_path "$work/sparse"
 fi
