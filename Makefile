@@ -82,6 +82,7 @@ test: $(LOGS) $(EXAMPLES) $(BUILD)/show ## every test; SSDGS_GOLDEN=folder reads
 	  passed=$$((passed + $$1)); failed=$$((failed + $$2)); \
 	done; echo "$$passed passed, $$failed failed"; [ $$failed -eq 0 ]
 $(filter-out %/fuzz.log,$(TESTS:=.log)): %.log: %
+	@rm -rf $*_files # an earlier run's
 	@$(RUN) $* $(KEEP_LOG)
 $(BUILD)/fuzz.log: %.log: %
 	@$(RUN) $* tests/fuzz/seeds/*/* $(KEEP_LOG)
@@ -107,6 +108,9 @@ test-plain: $(BUILD)/relight ## plain splats with spherical harmonics beside Spa
 
 test-images: $(BUILD)/pixels ## images that other programs wrote, beside what these make of them; leaves out what is missing
 	sh tests/images.sh $(BUILD)
+
+test-capture: $(BUILD)/colmap $(BUILD)/check $(BUILD)/train $(BUILD)/relight ## two phones' photographs, rendered, through COLMAP to a model, beside what is known; needs blender, python3-numpy and colmap (hours)
+	sh tests/capture.sh $(BUILD) $(BUILD)/capture
 
 test-gpu: $(BUILD)/t_gpu ## examples/gpu on a GPU or in Mesa's software; needs EGL with OpenGL 4.3
 	$(BUILD)/t_gpu
@@ -219,5 +223,5 @@ $(BUILD)/fuzzers/all: tests/fuzz/fuzz.c $(HEADERS)
 	clang -O1 -gline-tables-only -DLIBFUZZER -DSSDGS_NO_AVX512 -fsanitize=fuzzer,address,undefined,float-cast-overflow \
 	  -fno-sanitize-recover=all $< -o $@ $(LDLIBS)
 
-.PHONY: $(LOGS) all demo view web test-browser test-gltf test-editors test-plain test-images test-gpu test-engine test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
+.PHONY: $(LOGS) all demo view web test-browser test-gltf test-editors test-plain test-capture test-images test-gpu test-engine test-mpi bench bench-quick size hashes experiments experiments-quick test test-asan test-ubsan test-tsan test-cxx test-clang test-tcc test-nosimd test-native test-fastmath \
 	test-c99 test-matrix fuzz mutants figures figures-so-far clean help

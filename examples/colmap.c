@@ -44,6 +44,8 @@ typedef struct job {
     ssdgs_context *context;
 } job;
 
+static const double no_offset[3] = {0, 0, 0};
+
 static int fail(const char *message) {
     fprintf(stderr, "colmap: %s\n", message);
     return 1;
@@ -144,7 +146,6 @@ static char *joined(const char *folder, const char *kind, const char *name) {
 static int find_photographs(job *j, char error[512]) {
     static const char *const kinds[2] = {"images", "masks"};
     const colmap_model *m = &j->model;
-    const double still[3] = {0, 0, 0};
     char path[OLAT__MAX_PATH];
     int unmasked = 0;
     const size_t count = (size_t)m->image_count;
@@ -154,7 +155,7 @@ static int find_photographs(job *j, char error[512]) {
     j->sources = (source *)calloc(count, sizeof *j->sources);
     if (!j->all.frames || !j->images || !j->partners || !j->sources)
         return olat__fail(error, "out of memory");
-    colmap_centre(m->images, still, j->all.origin); /* numbers stay small where coordinates are large */
+    colmap_centre(m->images, no_offset, j->all.origin); /* numbers stay small where coordinates are large */
     for (int i = 0; i < m->image_count; i++) {
         const colmap_image *image = m->images + i;
         source *files = j->sources + i;
@@ -412,17 +413,28 @@ static int find_box(job *j, olat_frame *const *seen, const double origin[3]) {
     return failed;
 }
 
+/* A point that the photographs of one instant show. */
+typedef struct pair {
+    double alike, ratio[3]; /* cosine of the angle between the two views; the lamp's light by the other's */
+} pair;
+
+static int most_alike_first(const void *a, const void *b) {
+    const double x = ((const pair *)a)->alike, y = ((const pair *)b)->alike;
+    return (x < y) - (x > y);
+}
+
 /* How bright the lamp's photographs are beside those that were taken at once: the medians over the points
-   that both saw, neither black nor at full white. */
+   that both saw, neither black nor at full white. The quarter that is seen from the most alike directions
+   tells: from others most things look brighter or darker. */
 static int compare_phones(job *j, olat_frame *const *seen, const double origin[3]) {
-    enum { MOST = 1 << 16 };
+    enum { MOST = 1 << 16, FEWEST = 50 };
     const colmap_model *m = &j->model;
-    double *ratios[3], found[3];
-    int count = 0, failed = 0;
+    int count = 0;
     int *frames = (int *)malloc((size_t)m->image_count * sizeof *frames); /* of the model's images */
     char *sees = (char *)malloc((size_t)m->image_count);
-    for (int c = 0; c < 3; c++) failed |= (ratios[c] = (double *)malloc(MOST * sizeof **ratios)) == NULL;
-    failed |= !frames || !sees;
+    pair *pairs = (pair *)malloc(MOST * sizeof *pairs);
+    double *ratios = (double *)malloc(MOST * sizeof *ratios);
+    const int failed = !frames || !sees || !pairs || !ratios;
     for (int i = 0; i < m->image_count && !failed; i++) frames[i] = -1;
     for (int i = 0; i < j->all.count && !failed; i++) frames[j->images[i]] = i;
     for (int p = 0; p < m->point_count && !failed; p++) {
@@ -434,39 +446,48 @@ static int compare_phones(job *j, olat_frame *const *seen, const double origin[3
         for (int i = 0; i < j->all.count && count < MOST; i++) {
             const int partner = j->partners[i] < 0 ? -1 : frames[j->partners[i]];
             if (partner < 0 || !sees[j->images[i]] || !sees[j->partners[i]]) continue;
-            double light[2][3];
+            double light[2][3], views[2][3];
             int usable = 1;
             for (int k = 0; k < 2; k++) {
                 const olat_frame *frame = seen[k ? partner : i];
                 const ptrdiff_t pixel = pixel_of(frame, place);
                 usable &= pixel >= 0;
+                colmap_centre(m->images + j->images[k ? partner : i], no_offset, views[k]);
                 for (size_t c = 0; c < 3 && usable; c++) {
                     const ssdgs_real v = olat__number(frame->pixels, frame->format, 4 * (size_t)pixel + c);
                     light[k][c] = (double)(olat__is_light(frame->format) ? v : ssdgs_srgb_decode(v));
                     usable &= light[k][c] > 0.01 && (olat__is_light(frame->format) || light[k][c] < 0.9);
+                    views[k][c] -= point->place[c];
                 }
             }
             if (!usable) continue;
-            for (int c = 0; c < 3; c++) ratios[c][count] = light[1][c] / light[0][c];
-            count++;
+            pair *made = pairs + count++;
+            made->alike = olat__dot(views[0], views[1]) /
+                          sqrt(olat__dot(views[0], views[0]) * olat__dot(views[1], views[1]));
+            for (int c = 0; c < 3; c++) made->ratio[c] = light[1][c] / light[0][c];
         }
     }
-    for (int c = 0; c < 3 && !failed && count >= 50; c++) found[c] = hull__quantile(ratios[c], count, 0.5);
-    for (int c = 0; c < 3; c++) free(ratios[c]);
+    if (!failed && count >= FEWEST) {
+        double found[3];
+        qsort(pairs, (size_t)count, sizeof *pairs, most_alike_first);
+        count = count / 4 > FEWEST ? count / 4 : FEWEST;
+        for (int c = 0; c < 3; c++) {
+            for (int i = 0; i < count; i++) ratios[i] = pairs[i].ratio[c];
+            found[c] = hull__quantile(ratios, count, 0.5);
+        }
+        for (int i = 0; i < j->all.count; i++)
+            for (int c = 0; c < 3 && is_lamp(j, j->images[i]); c++)
+                j->all.frames[i].light.intensity[c] = (ssdgs_real)found[c];
+        printf("the lamp's photographs are %.3f, %.3f, %.3f times as bright as the others (red, green, blue; "
+               "%d points)\n",
+               found[0], found[1], found[2], count);
+    } else if (!failed)
+        note("only %d points tell how bright the two phones' photographs are: taken for alike", count);
     free(frames);
     free(sees);
-    if (failed) return 1;
-    if (count < 50) {
-        note("only %d points tell how bright the two phones' photographs are: taken for alike", count);
-        return 0;
-    }
-    for (int i = 0; i < j->all.count; i++)
-        for (int c = 0; c < 3 && is_lamp(j, j->images[i]); c++)
-            j->all.frames[i].light.intensity[c] = (ssdgs_real)found[c];
-    printf("the lamp's photographs are %.3f, %.3f, %.3f times as bright as the others (red, green, blue; %d "
-           "points)\n",
-           found[0], found[1], found[2], count);
-    return 0;
+    free(pairs);
+    free(ratios);
+    return failed;
 }
 
 /* Reads the lists as training does, only smaller, and adds what the photographs tell. */

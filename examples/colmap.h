@@ -401,12 +401,12 @@ OLAT__API int colmap_load(const char *folder, colmap_model *m, char error[512]) 
     return failed;
 }
 
-/* Where an image's camera stands, moved along its own axes: right, up, back. */
-OLAT__API void colmap_centre(const colmap_image *image, const double offset[3], double centre[3]) {
+/* Where an image's camera stands, or a place beside it, along its own axes: right, up, back. */
+OLAT__API void colmap_centre(const colmap_image *image, const double beside[3], double place[3]) {
     for (int i = 0; i < 3; i++) {
-        centre[i] = 0;
+        place[i] = 0;
         for (int k = 0; k < 3; k++)
-            centre[i] += image->rotation[3 * k + i] * ((k ? -offset[k] : offset[k]) - image->translation[k]);
+            place[i] += image->rotation[3 * k + i] * ((k ? -beside[k] : beside[k]) - image->translation[k]);
     }
 }
 
