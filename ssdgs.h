@@ -10912,8 +10912,8 @@ static ssdgs_result ssdgs__densify(ssdgs_trainer *trainer) {
     const ssdgs_train_options *o = &trainer->options;
     const size_t n = (size_t)model->count, allowed = ssdgs__allowed(trainer);
     const double largest =
-        log(0.1 * trainer->extent > 2 * trainer->run.start_size ? 0.1 * trainer->extent
-                                                                : 2 * trainer->run.start_size);
+        log(0.1 * trainer->extent > 4 * trainer->run.start_size ? 0.1 * trainer->extent
+                                                                : 4 * trainer->run.start_size);
     const ssdgs_real faint = (ssdgs_real)log(SSDGS__FAINT / (1 - SSDGS__FAINT));
     /* opacities were reset since the last control: worths say little */
     const int before = trainer->run.iteration - o->batch, last = ssdgs__last_reset(o, before);
@@ -11166,7 +11166,8 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
         round = 1;
     }
     for (int c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
-    trainer->run.start_size = 1.1576 * 0.62035 * pow(volume / ((double)n * round), 1.0 / 3);
+    /* half of what random points are from their three nearest on average: smaller ones keep more apart */
+    trainer->run.start_size = 0.5 * 0.71812 * pow(volume / ((double)n * round), 1.0 / 3);
     for (size_t i = 0; i < kept; i++) {
         ssdgs_real *g = model->gaussians + i;
         double length = 0;
