@@ -37,6 +37,7 @@ def arguments():
     p.add_argument('--watts', type=float, help="of the lamp: a dataset's pl_intensity")
     p.add_argument('--coat', type=float, default=5, help="jade: the reflected lobe's half width at half its height, in degrees")
     p.add_argument('--medium', type=int, choices=MEDIA, default=1, help='jade: 1 jade, 2 soap, 3 red wax')
+    p.add_argument('--normals', action='store_true', help='of a dataset: train_normals and test_normals instead, (n + 1) / 2 in the world, 16 bits')
     p.add_argument('--distort', nargs='?', const='-.12,.03,.001,-.0008', help="phones: K1,K2,P1,P2 of OpenCV's lens")
     p.add_argument('--exposure-b', type=float, default=1, help="phones: B's beside A's")
     p.add_argument('--format', choices=FORMATS, default='jpg', help='phones: JPEG, PNG of 16 bits or OpenEXR')
@@ -243,6 +244,11 @@ def phones(a, s):
 
 def dataset(a, s):
     angle, s.render.film_transparent = math.radians(36), True
+    kind, settings = '', dict(file_format='PNG', color_mode='RGBA', color_depth='8')
+    if a.normals:
+        s.view_layers[0].material_override = material('Emission', Color=lambda tree: node(tree, 'VectorMath', {0: node(tree, 'NewGeometry', {}).outputs['Normal'],
+            1: (.5, .5, .5), 2: (.5, .5, .5)}, operation='MULTIPLY_ADD').outputs[0])
+        s.view_settings.view_transform, kind, settings['color_depth'] = 'Raw', '_normals', '16'
     for part, count, samples in ('train', a.train, a.samples), ('test', a.test, a.test_samples):
         frames = []
         for i in range(count):
@@ -250,8 +256,8 @@ def dataset(a, s):
             around = lambda low, high: place(draw.uniform(0, 2 * math.pi), draw.uniform(-.97, .97), draw.uniform(low, high))
             matrix, lamp = camera(around(1.9, 2.3), np.zeros(3)), around(1.9, 2.5)
             frames.append({'file_path': f'./{part}/r_{i:03d}', 'file_ext': '.png', 'pl_intensity': [a.watts] * 3, 'pl_pos': lamp.tolist(), 'transform_matrix': matrix.tolist()})
-            yield f'{part}/r_{i:03d}.png', lambda path, view=(matrix, lamp, a.size, angle, samples, a.noise * 1000 + i): render(
-                s, path + '.png', *view, file_format='PNG', color_mode='RGBA', color_depth='8')
+            yield f'{part}{kind}/r_{i:03d}.png', lambda path, view=(matrix, lamp, a.size, angle, samples, a.noise * 1000 + i): render(
+                s, path + '.png', *view, **settings)
         tell(f'{a.out}/transforms_{part}.json', camera_angle_x=angle, w=a.size[0], h=a.size[1], frames=frames)
     tell(f'{a.out}/truth.json', arguments=vars(a))
 
