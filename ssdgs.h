@@ -11166,7 +11166,7 @@ static ssdgs_result ssdgs__random_start(ssdgs_trainer *trainer) {
         round = 1;
     }
     for (int c = 0; c < 3; c++) volume *= (double)o->bounds_max[c] - (double)o->bounds_min[c];
-    /* half of what random points are from their three nearest on average: smaller ones keep more apart */
+    /* half of random points' mean distance to their three nearest */
     trainer->run.start_size = 0.5 * 0.71812 * pow(volume / ((double)n * round), 1.0 / 3);
     for (size_t i = 0; i < kept; i++) {
         ssdgs_real *g = model->gaussians + i;

@@ -460,10 +460,11 @@ static int compare_phones(job *j, olat_frame *const *seen, const double origin[3
                     views[k][c] -= point->place[c];
                 }
             }
-            if (!usable) continue;
+            const double alike = olat__dot(views[0], views[1]) /
+                                 sqrt(olat__dot(views[0], views[0]) * olat__dot(views[1], views[1]));
+            if (!usable || !(alike >= -2)) continue; /* no number: farther away than squares are numbers */
             pair *made = pairs + count++;
-            made->alike = olat__dot(views[0], views[1]) /
-                          sqrt(olat__dot(views[0], views[0]) * olat__dot(views[1], views[1]));
+            made->alike = alike;
             for (int c = 0; c < 3; c++) made->ratio[c] = light[1][c] / light[0][c];
         }
     }
