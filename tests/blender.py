@@ -258,8 +258,10 @@ def dataset(a, s):
             frames.append({'file_path': f'./{part}/r_{i:03d}', 'file_ext': '.png', 'pl_intensity': [a.watts] * 3, 'pl_pos': lamp.tolist(), 'transform_matrix': matrix.tolist()})
             yield f'{part}{kind}/r_{i:03d}.png', lambda path, view=(matrix, lamp, a.size, angle, samples, a.noise * 1000 + i): render(
                 s, path + '.png', *view, **settings)
-        tell(f'{a.out}/transforms_{part}.json', camera_angle_x=angle, w=a.size[0], h=a.size[1], frames=frames)
-    tell(f'{a.out}/truth.json', arguments=vars(a))
+        if not a.normals:
+            tell(f'{a.out}/transforms_{part}.json', camera_angle_x=angle, w=a.size[0], h=a.size[1], frames=frames)
+    if not a.normals:
+        tell(f'{a.out}/truth.json', arguments=vars(a))
 
 def tell(path, **what):
     with open(path, 'w') as file:
