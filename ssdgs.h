@@ -181,6 +181,7 @@ CHANGES, for programs written for 0.2.4
   ssdgs_checkpoint_iteration(..) another argument: of how many iterations
   {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
   a hook's view is `cached` 1    2; 1 says that WALK is to be done again
+  ssdgs_stage_fail(frame, ..)    ssdgs_context_fail(frame->context, ..)
   ssdgs_scene_light(.., lights)  the camera before the lights, or NULL
   ssdgs_to_pixels(image, ..)     ssdgs_to_pixels(context, image, ..), and ssdgs_blend_pixels() alike
   options.max_gaussians          what training ends with; before it may have options.surplus times as many
@@ -983,7 +984,7 @@ SSDGS_API ssdgs_model_view ssdgs_model_peek(const ssdgs_model *model);
    until that stage works on the view again, or the memory is released. Where it is lost, PROJECT clears
    `cached`.
 
-   A result other than SSDGS_OK ends the frame, of which nothing is kept; ssdgs_stage_fail() says why.
+   A result other than SSDGS_OK ends the frame, of which nothing is kept; ssdgs_context_fail() says why.
 
    Where layer_count is not 0, light is deferred: WALK fills the light maps, SHADE the layers, and COMPOSITE
    adds the diffuse and specular terms of what they blend to. An image's components are the CPU's work. It
@@ -1203,8 +1204,9 @@ typedef struct ssdgs_frame {
 
 /* Runs the CPU's version of a stage: what a hook calls where it cannot. */
 SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage);
-/* Makes `message` that of the context, and returns `result`, for a hook to return. */
-SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result, const char *message);
+/* Makes `message` that of the context, tells its log, and returns `result`: for hooks, and what is built on
+   the library. */
+SSDGS_API ssdgs_result ssdgs_context_fail(ssdgs_context *context, ssdgs_result result, const char *message);
 
 #ifdef __cplusplus
 }
@@ -1261,6 +1263,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__ATTRIBUTE(target_string) __attribute__((target(target_string)))
 #define SSDGS__PREFETCH(p) __builtin_prefetch(p)
 #define SSDGS__UNUSED __attribute__((unused))
+#define SSDGS__FORMAT(n) __attribute__((format(__printf__, n, n + 1))) /* the compiler looks at arguments */
 #if defined(__clang__)
 #define SSDGS__UNROLL _Pragma("clang loop unroll(full)")
 #define SSDGS__UNROLL_SCALAR /* its vectoriser does better */
@@ -1278,6 +1281,7 @@ SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result,
 #define SSDGS__ATTRIBUTE(target_string)
 #define SSDGS__PREFETCH(p) ((void)(p))
 #define SSDGS__UNUSED
+#define SSDGS__FORMAT(n)
 #endif
 #ifndef SSDGS__UNROLL
 #define SSDGS__UNROLL
@@ -1870,7 +1874,7 @@ static void ssdgs__append_number(char *text, size_t *at, double value) {
     }
 }
 
-/* Appends %s, %d int, %z size_t, %g double. */
+/* Appends %s, %d, %zu and %g, as printf() does; others stand as they are. */
 static void ssdgs__append_format(char *text, size_t *at, const char *format, va_list arguments) {
     char one[2] = {0, 0};
     for (; *format; format++) {
@@ -1879,8 +1883,9 @@ static void ssdgs__append_format(char *text, size_t *at, const char *format, va_
         else switch (*++format) {
             case 's': ssdgs__append(text, at, va_arg(arguments, const char *)); break;
             case 'd': ssdgs__append_number(text, at, (double)va_arg(arguments, int)); break;
-            case 'z': ssdgs__append_number(text, at, (double)va_arg(arguments, size_t)); break;
-            default: ssdgs__append_number(text, at, va_arg(arguments, double)); break;
+            case 'z': format++, ssdgs__append_number(text, at, (double)va_arg(arguments, size_t)); break;
+            case 'g': ssdgs__append_number(text, at, va_arg(arguments, double)); break;
+            default: ssdgs__append(text, at, one), format--;
             }
     }
 }
@@ -1893,6 +1898,7 @@ static void ssdgs__tell(ssdgs_context *context, ssdgs_result code, const char *m
 }
 
 /* Records what went wrong, tells the log, returns the code; without a context, that alone. */
+SSDGS__FORMAT(3)
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
     if (!context) return code;
@@ -1919,7 +1925,7 @@ static ssdgs_result ssdgs__null(ssdgs_context *context, const char *function, co
 }
 
 /* What is no failure, for the log alone. */
-static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
+SSDGS__FORMAT(2) static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
     char text[SSDGS__MESSAGE] = "";
     size_t at = 0;
     va_list arguments;
@@ -2017,7 +2023,7 @@ static void ssdgs__release_to(const ssdgs_allocator *allocator, void *memory) {
 
 static void *ssdgs__allocate(ssdgs_context *context, size_t bytes) {
     void *memory = ssdgs__allocate_from(&context->allocator, bytes);
-    if (!memory) ssdgs__fail(context, SSDGS_ERR_MEMORY, "out of memory: %z bytes", bytes);
+    if (!memory) ssdgs__fail(context, SSDGS_ERR_MEMORY, "out of memory: %zu bytes", bytes);
     return memory;
 }
 
@@ -2035,7 +2041,7 @@ typedef struct ssdgs__buffer {
 static ssdgs_result ssdgs__reserve(ssdgs_context *context, ssdgs__buffer *buffer, size_t count, size_t size) {
     size_t bytes = ssdgs__times(count, size);
     if (bytes > SIZE_MAX - bytes / 8)
-        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %z x %z bytes does not fit in memory",
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a buffer of %zu x %zu bytes does not fit in memory",
                            count, size);
     if (bytes <= buffer->bytes && buffer->memory) return SSDGS_OK;
     ssdgs__release(context, buffer->memory);
@@ -2902,7 +2908,7 @@ static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
     for (i = 0; ssdgs__finite(model->globals[i]); i++) {}
     int group;
     for (group = 0; i >= first[group + 1]; group++) {}
-    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %z of %s is not finite",
+    return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %zu of %s is not finite",
                        i - first[group], names[group]);
 }
 
@@ -3410,9 +3416,10 @@ static ssdgs_result ssdgs__model_move(ssdgs_model *model, ssdgs_context *to) {
 }
 
 SSDGS_API ssdgs_result ssdgs_model_move(ssdgs_model *model, ssdgs_context *to) {
-    if (!model || !to) return SSDGS_ERR_ARGUMENT;
+    if (!model) return SSDGS_ERR_ARGUMENT;
     ssdgs_context *from = model->context;
     ssdgs_result result = SSDGS__ENTER(from, "ssdgs_model_move");
+    if (!result && !to) return ssdgs__leave(from, ssdgs__null(from, "ssdgs_model_move", "to"));
     if (result || from == to) return result ? result : ssdgs__leave(from, SSDGS_OK);
     if (SSDGS__ENTER(to, "ssdgs_model_move"))
         return ssdgs__leave(from, ssdgs__fail(from, SSDGS_ERR_ARGUMENT,
@@ -3659,9 +3666,10 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
                                             : !buffer   ? "buffer"
                                                         : "depth")
                               : ssdgs__projection_matrix(context, projection, flags, p);
-    if (!result && (width < 1 || height < 1 || (height > 1 && pitch < 4 * width && -pitch < 4 * width)))
-        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "depth buffer: %d x %d pixels, pitch %ld", width,
-                             height, (long)pitch);
+    if (!result && (width < 1 || width > SSDGS__MAX_SIDE || height < 1 || height > SSDGS__MAX_SIDE ||
+                    (height > 1 && pitch < 4 * width && -pitch < 4 * width)))
+        result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "depth buffer: %d x %d pixels, pitch %g", width,
+                             height, (double)pitch);
     if (!result && p[11] == 0)
         result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT,
                              "depth buffer: row 2, column 3 of projection is 0: its depths are all the same");
@@ -4159,14 +4167,16 @@ static ssdgs_result ssdgs__occluder_check(ssdgs_context *context, const ssdgs_oc
                   occluder->map_count);
     for (int i = 0; i < occluder->map_count; i++) {
         const ssdgs_shadow_map *m = occluder->maps + i;
-        SSDGS__REFUSE(m->width < 1 || m->width > 32768 || m->height < 1 || m->height > 32768,
-                      "shadow map %d: %d x %d pixels, where 1 to 32768 are possible", i, m->width, m->height);
+        SSDGS__REFUSE(m->width < 1 || m->width > SSDGS__MAX_SIDE || m->height < 1 ||
+                          m->height > SSDGS__MAX_SIDE,
+                      "shadow map %d: %d x %d pixels, where 1 to %d are possible", i, m->width, m->height,
+                      SSDGS__MAX_SIDE);
         SSDGS__REFUSE(!m->depth && !context->gpu.stage[SSDGS_STAGE_WALK], "shadow map %d: depth is NULL", i);
         SSDGS__REFUSE(m->height > 1 && m->depth && m->pitch < 4 * m->width && -m->pitch < 4 * m->width,
-                      "shadow map %d: pitch = %ld, where a row has %ld bytes", i, (long)m->pitch,
-                      4 * (long)m->width);
-        SSDGS__REFUSE(m->light < 0 || (m->flags & ~known), "shadow map %d: light = %d, flags = %d", i,
-                      m->light, m->flags);
+                      "shadow map %d: pitch = %g, where a row has %d bytes", i, (double)m->pitch,
+                      4 * m->width);
+        SSDGS__REFUSE(m->light < 0, "shadow map %d: light = %d is negative", i, m->light);
+        SSDGS__REFUSE(m->flags & ~known, "shadow map %d: flags = %d has unknown bits", i, m->flags);
         SSDGS__REFUSE(!(m->bias >= 0 && ssdgs__finite(m->bias) && m->range >= 0 && ssdgs__finite(m->range)),
                       "shadow map %d: bias = %g or range = %g is negative or not finite", i, (double)m->bias,
                       (double)m->range);
@@ -7697,9 +7707,9 @@ SSDGS_API ssdgs_result ssdgs_stage_cpu(ssdgs_frame *frame, ssdgs_stage stage) {
     }
 }
 
-SSDGS_API ssdgs_result ssdgs_stage_fail(ssdgs_frame *frame, ssdgs_result result, const char *message) {
-    if (!frame || !message) return SSDGS_ERR_ARGUMENT;
-    return ssdgs__fail(frame->context, result, "%s", message);
+SSDGS_API ssdgs_result ssdgs_context_fail(ssdgs_context *context, ssdgs_result result, const char *message) {
+    if (!context || !message) return SSDGS_ERR_ARGUMENT;
+    return ssdgs__fail(context, result, "%s", message);
 }
 
 static ssdgs_result ssdgs__run_each(ssdgs_frame *frame, int first, int last) {
@@ -9170,7 +9180,7 @@ static ssdgs_result ssdgs__ply_broken(const ssdgs__ply *ply, const ssdgs__ply_el
         memcpy(names[i], tokens[i].text, length);
         names[i][length] = 0;
     }
-    return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s, row %z, property %s: %s", ply->name,
+    return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: element %s, row %zu, property %s: %s", ply->name,
                        names[0], row, names[1], ply->why);
 }
 
@@ -9399,7 +9409,7 @@ static ssdgs_result ssdgs__ply_read_rows(ssdgs__ply *ply, int kind, ssdgs_model 
         if (bad < target) {
             char name[32];
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
-                               "%s: element %s, row %z, property %s: it is not finite", ply->name,
+                               "%s: element %s, row %zu, property %s: it is not finite", ply->name,
                                ssdgs__ply_kinds[kind], row, ssdgs__ply_name(&bad->cursor, name));
         }
         for (const ssdgs__ply_target *t = targets; t < target; t++)
@@ -9445,7 +9455,7 @@ static void ssdgs__ply_tell(const ssdgs__ply *ply, const ssdgs_model *model, con
     int moved = 0;
     for (int i = 0; i < 3; i++) moved |= ply->origin[i] < 0 || ply->origin[i] > 0;
     if (ply->behind)
-        ssdgs__note(context, "%s: %z bytes behind the last element are not read: was it copied as text?",
+        ssdgs__note(context, "%s: %zu bytes behind the last element are not read: was it copied as text?",
                     name, ply->behind);
     if (stats->dropped)
         ssdgs__note(context, "%s: %d Gaussians of %d are left out: they have values that are not finite",
@@ -9476,7 +9486,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
     const ssdgs__ply_element *vertex = ply->known[SSDGS__PLY_VERTEX];
     if (!vertex) return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT, "%s: no element vertex", ply->name);
     if (vertex->count > SSDGS__MAX_GAUSSIANS)
-        return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %z Gaussians are too many", ply->name,
+        return ssdgs__fail(ply->context, SSDGS_ERR_LIMIT, "%s: %zu Gaussians are too many", ply->name,
                            vertex->count);
 
     if (ssdgs__ply_has(ply, vertex, "packed_position"))
@@ -9521,7 +9531,7 @@ static ssdgs_result ssdgs__ply_read(ssdgs__ply *ply, ssdgs_model **out, ssdgs_lo
                      rows = ply->known[kind] ? ply->known[kind]->count : 0;
         if (rows != expected && (ours || ply->known[kind]))
             return ssdgs__fail(ply->context, SSDGS_ERR_FORMAT,
-                               "%s: element %s has %z rows, the settings need %z%s", ply->name,
+                               "%s: element %s has %zu rows, the settings need %zu%s", ply->name,
                                ssdgs__ply_kinds[kind], rows, expected,
                                ply->known[kind] ? "" : ": has another program dropped it?");
         if (ply->known[kind]) result = ssdgs__ply_require(ply, kind, 0, SSDGS__PLY_WORDS);
@@ -10569,7 +10579,7 @@ static ssdgs_result ssdgs__adam_step(ssdgs_trainer *trainer, const ssdgs_frame *
     for (int i = 0; i < job.ranges; i++)
         if (job.range[i].bad)
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE,
-                               "iteration %d refused: the gradient of %s, element %z, is not finite",
+                               "iteration %d refused: the gradient of %s, element %zu, is not finite",
                                trainer->run.iteration, ssdgs__group_names[job.range[i].group],
                                job.range[i].bad - 1);
     ssdgs__parallel(context, (int)job.chunks, ssdgs__adam_task, &job);
@@ -10721,7 +10731,7 @@ static ssdgs_result ssdgs__trainer_grow(ssdgs_trainer *trainer, size_t count) {
                                 ? model->capacity
                                 : (count + count / 4 + SSDGS__BLOCK - 1) / SSDGS__BLOCK * SSDGS__BLOCK;
     const size_t bytes = ssdgs__times(capacity, SSDGS_CHANNELS * sizeof(ssdgs_real));
-    if (bytes == SIZE_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%z Gaussians", capacity);
+    if (bytes == SIZE_MAX) return ssdgs__fail(context, SSDGS_ERR_LIMIT, "%zu Gaussians", capacity);
     ssdgs_real *statistics =
         (ssdgs_real *)ssdgs__allocate(context, (SSDGS__STATISTICS + 2) * capacity * sizeof(ssdgs_real));
     ssdgs_real *grown[3];
@@ -11249,9 +11259,10 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     for (size_t i = 0; !result && ssdgs__is_light(photo) && i < numbers; i++) {
         const ssdgs_real number = ssdgs__photo_number(photo, i);
         if (!ssdgs__finite(number))
-            result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "pixel %z is not finite", i / 4);
+            result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "pixel %zu is not finite", i / 4);
         else if (i % 4 == 3 && (number < 0 || number > 1))
-            result = ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "pixel %z has alpha %g", i / 4, (double)number);
+            result =
+                ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "pixel %zu has alpha %g", i / 4, (double)number);
     }
     for (int i = 0; i < 3 && !result; i++)
         if (!ssdgs__finite(background[i]))
@@ -11862,7 +11873,7 @@ static ssdgs_result ssdgs__evaluate(ssdgs_model *model, const ssdgs_photo *photo
     const size_t pixels = (size_t)photo->camera.width * (size_t)photo->camera.height;
     ssdgs_real *rendered;
     if (pixels > SIZE_MAX / 9 / sizeof *rendered)
-        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a photograph of %z pixels", pixels);
+        return ssdgs__fail(context, SSDGS_ERR_LIMIT, "a photograph of %zu pixels", pixels);
     rendered = (ssdgs_real *)ssdgs__allocate(context, pixels * 9 * sizeof *rendered);
     if (!rendered) return SSDGS_ERR_MEMORY;
     ssdgs_real *target = rendered + 3 * pixels;

@@ -370,7 +370,7 @@ static inline int adopt__find(adopt__state *a, int together, const char **proble
 /* Replaces *model by one that has the original's settings, ASG and networks. own: what loading *model told,
    NULL: its settings are its own; trained: what loading the original told, or NULL. *problem: why it is not
    known where the editor has put the model, or NULL. ERR_ARGUMENT: one of them is baked. ERR_MEMORY. After an
-   error nothing has changed. */
+   error nothing has changed; the context's message says why. */
 static inline ssdgs_result adopt_model(ssdgs_context *context, ssdgs_model **model,
                                        const ssdgs_load_stats *own, const ssdgs_model *original,
                                        const ssdgs_load_stats *trained, const char **problem) {
@@ -383,7 +383,8 @@ static inline ssdgs_result adopt_model(ssdgs_context *context, ssdgs_model **mod
     a.lost = own && own->untrained;
     a.settings = *ssdgs_model_settings(original);
     const ssdgs_settings *before = ssdgs_model_settings(*model);
-    if (before->baked || a.settings.baked) return SSDGS_ERR_ARGUMENT; /* there are no networks */
+    if (before->baked || a.settings.baked)
+        return ssdgs_context_fail(context, SSDGS_ERR_ARGUMENT, "adopt_model: a baked model has no networks");
     int together = 1;
     for (int c = 0; c < 3; c++) {
         a.apart[c] = (double)before->origin[c] - (double)a.settings.origin[c];
@@ -394,7 +395,9 @@ static inline ssdgs_result adopt_model(ssdgs_context *context, ssdgs_model **mod
     a.keys = (uint64_t *)malloc(((size_t)a.original.count + 1) * sizeof *a.keys);
     a.match = (int *)malloc((count + 1) * sizeof *a.match);
     a.pair = (adopt__pair_of_places *)malloc(ADOPT__PAIRS * sizeof *a.pair);
-    ssdgs_result result = a.keys && a.match && a.pair ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    ssdgs_result result = a.keys && a.match && a.pair
+                              ? SSDGS_OK
+                              : ssdgs_context_fail(context, SSDGS_ERR_MEMORY, "adopt_model: out of memory");
     const int stays = result ? 1 : adopt__find(&a, together, problem);
     if (!result) result = ssdgs_model_create(context, &a.settings, a.model.count, &whole);
     if (!result) {

@@ -332,11 +332,16 @@ static inline void reduce__copy(ssdgs_real *to, const ssdgs_real *from, size_t c
 
 /* Makes of *model one of `count` Gaussians, on the same context, destroys it and puts the new one in its
    place. Where it has no more than that, it stays. A model that a trainer or an object uses must not be
-   given. ERR_ARGUMENT: count < 1. ERR_MEMORY. Where it fails, *model is as it was. */
+   given. ERR_ARGUMENT: count < 1. ERR_MEMORY. Where it fails, *model is as it was; the context's message says
+   why. */
 static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **model, int count) {
     reduce__state r;
     memset(&r, 0, sizeof r);
-    if (!context || !model || !*model || count < 1) return SSDGS_ERR_ARGUMENT;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    if (!model || !*model || count < 1)
+        return ssdgs_context_fail(context, SSDGS_ERR_ARGUMENT,
+                                  !model || !*model ? "reduce_model: model is NULL"
+                                                    : "reduce_model: count < 1");
     const ssdgs_model_view given = ssdgs_model_peek(*model);
     if (count >= given.count) return SSDGS_OK;
     const size_t n = r.rows = (size_t)given.count, pairs = (n / REDUCE__LEAF + 2) * (REDUCE__LEAF / 2);
@@ -349,8 +354,9 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     r.left = (uint32_t *)malloc(n * sizeof *r.left);
     r.blob = (reduce__blob *)malloc(n * sizeof *r.blob);
     r.pair = (reduce__pair *)malloc(pairs * sizeof *r.pair);
-    ssdgs_result result =
-        r.raw && r.seen && r.flux && r.left && r.blob && r.pair ? SSDGS_OK : SSDGS_ERR_MEMORY;
+    ssdgs_result result = r.raw && r.seen && r.flux && r.left && r.blob && r.pair
+                              ? SSDGS_OK
+                              : ssdgs_context_fail(context, SSDGS_ERR_MEMORY, "reduce_model: out of memory");
     for (size_t c = 0; c < r.planes && !result; c++)
         reduce__copy(r.raw + c * n, given.gaussians + c * given.stride, n);
     for (size_t i = 0; i < n && !result; i++) r.left[i] = (uint32_t)i;
@@ -368,8 +374,11 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     desc.threads = ssdgs_context_threads(context);
     desc.isa = ssdgs_context_isa(context);
     desc.gpu = &hook;
+    const int enough = !result;
     if (!result) result = ssdgs_context_create(&desc, &r.context);
     if (!result) result = reduce__rows(&r, count);
+    if (result && enough)
+        ssdgs_context_fail(context, result, r.context ? ssdgs_error_message(r.context) : "out of memory");
     ssdgs_context_destroy(r.context);
     ssdgs_model *fewer = NULL;
     if (!result) result = ssdgs_model_create(context, ssdgs_model_settings(*model), r.count, &fewer);
@@ -454,8 +463,8 @@ static inline void reduce_fine_steps(ssdgs_train_options *o, int iterations) {
 }
 
 /* Teaches a level, which reduce_model() has made of its original, what that shows from all around, lit from
-   all around: half a minute for 2,500 Gaussians. Models that are not trained, baked ones and media, and
-   placed ones stay as they are. Where it fails the level may be half taught. */
+   all around: half a minute for 2,500 Gaussians. Models that are not trained, baked ones and media, placed
+   ones and what has no size stay as they are. Where it fails the level may be half taught. */
 static inline ssdgs_result reduce_teach(ssdgs_model *original, ssdgs_model *level) {
     const ssdgs_settings *s = ssdgs_model_settings(original);
     ssdgs_photo photos[REDUCE__PICTURES];
@@ -470,6 +479,9 @@ static inline ssdgs_result reduce_teach(ssdgs_model *original, ssdgs_model *leve
     reduce_fine_steps(&o, REDUCE__LESSONS);
     o.prune_outside = 0;
     ssdgs_result result = ssdgs_model_bounds(original, o.bounds_min, o.bounds_max);
+    double size = 0;
+    for (int c = 0; c < 3; c++) size = fmax(size, (double)o.bounds_max[c] - (double)o.bounds_min[c]);
+    if (!result && !(size > 0)) return SSDGS_OK;
     for (int i = 0; i < REDUCE__PICTURES && !result; i++)
         result = reduce__picture(original, o.bounds_min, o.bounds_max, ssdgs_model_peek(level).count, i,
                                  photos + i, pixels + i);

@@ -715,8 +715,7 @@ static int take_networks(job *j, const char *path, const ssdgs_load_stats *own) 
         return !fail(ssdgs_error_message(j->context));
     const ssdgs_result result = adopt_model(j->context, &j->model, own, original, &trained, &problem);
     ssdgs_model_destroy(original);
-    if (result == SSDGS_ERR_ARGUMENT) return !fail("--networks: a baked model has no networks");
-    if (result) return !fail(ssdgs_result_string(result));
+    if (result) return !fail(ssdgs_error_message(j->context));
     fprintf(stderr, "relight: note: settings, ASG and networks are those of %s\n", path);
     if (problem)
         fprintf(stderr, "relight: note: %s; the model is not drawn as it was trained where it was moved\n",
@@ -745,10 +744,12 @@ static int relight(job *j) {
         if (ssdgs_model_load(j->context, j->model_path, &original, NULL))
             return fail(ssdgs_error_message(j->context));
         result = reduce_model(j->context, &j->model, j->reduce);
-        fprintf(stderr, "%d Gaussians learn what the model shows\n", ssdgs_model_count(j->model));
-        if (!result) result = reduce_teach(original, j->model);
+        if (!result) {
+            fprintf(stderr, "%d Gaussians learn what the model shows\n", ssdgs_model_count(j->model));
+            result = reduce_teach(original, j->model);
+        }
         ssdgs_model_destroy(original);
-        if (result) return fail(ssdgs_result_string(result));
+        if (result) return fail(ssdgs_error_message(j->context));
         if (!save_model(j, "reduced.ply")) return 1;
     }
     for (int i = 0; i < j->data.count; i++) {

@@ -20,7 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SPLATS__CHUNK = 256, SPLATS__MOST = 1 << 28, SPLATS__PROPERTIES = 64, SPLATS__HEAD = 4096 };
+enum { SPLATS__CHUNK = 256, SPLATS__MOST = 1 << 28, SPLATS__PROPERTIES = 64, SPLATS__HEAD = 1 << 16 };
 #define SPLATS__HARMONIC 0.28209479177387814 /* a colour is 0.5 + this x f_dc */
 
 /* ---- a plain PLY in memory ---- */
@@ -255,7 +255,7 @@ static inline const char *splats__gunzip(const unsigned char *in, size_t size, u
     if (at >= size - 8) return "a bad gzip header";
     const uint32_t checksum = olat__le32(in + size - 8);
     *length = olat__le32(in + size - 4);
-    if (*length / 1032 > size) return "a length that deflate cannot reach";
+    if (*length / 1032 > size) return "cut short, or of a length that deflate cannot reach";
     z = (olat__inflater *)calloc(1, sizeof *z);
     *out = (unsigned char *)malloc(*length + 1);
     const char *problem = z && *out ? NULL : "out of memory";
@@ -289,7 +289,9 @@ static inline int splats__spz(const char *name, const unsigned char *bytes, size
     if (bytes[14] & 2) return olat__fail(error, "%s: SPZ with extensions, which are not read", name);
     const size_t place = version == 1 ? 6 : 9, turn = version < 3 ? 3 : 4,
                  each = place + 1 + 3 + 3 + turn + (size_t)rest;
-    if (count > (size - 16) / each) return olat__fail(error, "%s: SPZ: it ends early", name);
+    if ((size - 16) % each != 0 || (size - 16) / each != count)
+        return olat__fail(error, "%s: SPZ: %lu bytes, which are not %lu Gaussians of %d", name,
+                          (unsigned long)(size - 16), (unsigned long)count, (int)each);
     const unsigned char *const position = bytes + 16, *const alpha = position + place * count,
                                *const color = alpha + count, *const scale = color + 3 * (size_t)count,
                                *const rotation = scale + 3 * (size_t)count,

@@ -748,7 +748,7 @@ static int train(job *j) {
             return fail(ssdgs_error_message(j->context));
         result = j->options.max_gaussians ? reduce_model(j->context, &j->model, j->options.max_gaussians)
                                           : SSDGS_OK;
-        if (result) return fail(ssdgs_result_string(result));
+        if (result) return fail(ssdgs_error_message(j->context));
         for (int i = 0; i < 3; i++) origin[i] = (double)ssdgs_model_settings(j->model)->origin[i];
     }
     const olat_reader reader = {j->context, on_terminal() ? tell_reading : NULL, &start};

@@ -20,6 +20,7 @@
 #define UNBAKE_H
 
 #include <math.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -105,6 +106,14 @@ static inline void unbake__copy(const unbake__state *u, ssdgs_model *model) {
                (size_t)u->count * sizeof *to.gaussians);
 }
 
+/* Makes that the context's message, after the function's name, with a number behind it. */
+static inline ssdgs_result unbake__refuse(ssdgs_context *context, ssdgs_result result, const char *what,
+                                          double number) {
+    char text[256];
+    snprintf(text, sizeof text, "unbake_model: %s%.7g", what, number);
+    return ssdgs_context_fail(context, result, text);
+}
+
 /* Who sees the sky: lights from all around shine on the Gaussians. */
 static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context) {
     ssdgs_settings settings = ssdgs_settings_default();
@@ -143,6 +152,7 @@ static inline ssdgs_result unbake__look(unbake__state *u, ssdgs_context *context
         }
         result = ssdgs_scene_light(scene, &object, 1, NULL, lights, count, &coarse);
     }
+    if (result) ssdgs_context_fail(context, result, own ? ssdgs_error_message(own) : "out of memory");
     ssdgs_scene_destroy(scene);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(own);
@@ -522,28 +532,63 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
             g.scattering[c] = translucent ? g.diffuse[c] : 0;
         }
         result = ssdgs_model_set(*out, i, &g);
+        if (result)
+            return unbake__refuse(context, result, "its colours and options.ambient make an albedo of ",
+                                  (double)u->albedo[3 * (size_t)i]);
     }
     if (!result) unbake__copy(u, *out);
     if (!result && o->kept > 0) unbake__keep(u, *out);
     return result;
 }
 
+/* Looks at the options, and whether the light is told. What is left goes into settings, which are looked at
+   there. */
+static inline ssdgs_result unbake__check(unbake__state *u, ssdgs_context *context) {
+    const unbake_options *o = u->options;
+    const double rough = (double)o->roughness, f0 = (double)o->f0;
+    const char *what = NULL;
+    double number = 0;
+    if (o->eye_count < 0 || o->eye_count > UNBAKE__SKY)
+        what = "eye_count is not 0 .. 32: ", number = o->eye_count;
+    else if (o->eye_count && !o->eyes) what = "eyes is NULL, eye_count ", number = o->eye_count;
+    else if (!(rough <= 0 && rough >= 0) && !(rough >= 0.01 && rough <= 1))
+        what = "roughness is neither 0 nor 0.01 .. 1: ", number = rough;
+    else if (!(f0 > 0 && f0 <= 1)) what = "f0 is not above 0, up to 1: ", number = f0;
+    for (int i = 0; i < 6 && !what; i++) {
+        number = (double)(i < 3 ? o->scattering : o->absorption)[i % 3];
+        if (!(number >= 0)) what = "scattering or absorption is below 0: ";
+    }
+    for (int i = 0; i < 3 * o->eye_count && !what; i++)
+        if (!(fabs((double)o->eyes[i / 3][i % 3]) < 1e18))
+            what = "a place of eyes is not finite or too far: ", number = (double)o->eyes[i / 3][i % 3];
+    for (int i = 0; i < 27 && !what; i++) {
+        const double light = (double)o->ambient[i / 3][i % 3];
+        u->told |= light < 0 || light > 0;
+        if (!(fabs(light) < 1e18) || (i < 3 && light < 0))
+            what = "ambient is not finite, or its mean is negative: ", number = light;
+    }
+    return what ? unbake__refuse(context, SSDGS_ERR_ARGUMENT, what, number) : SSDGS_OK;
+}
+
 /* Makes *lit, a model that takes light, of a plain splat (settings.baked), which stays, on the same context.
    Its own light is gone but for what options.kept says. options NULL = default. The same bits on any number
    of threads. ERR_ARGUMENT: plain is not baked, or an option is out of range. ERR_MEMORY. Where it fails,
-   *lit becomes NULL. */
+   *lit becomes NULL; the context's message says why. */
 static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model *plain,
                                         const unbake_options *options, ssdgs_model **lit) {
     const unbake_options none = unbake_options_default();
     unbake__state u;
     if (lit) *lit = NULL;
-    if (!context || !lit || !plain || !ssdgs_model_settings(plain)->baked) return SSDGS_ERR_ARGUMENT;
+    if (!context) return SSDGS_ERR_ARGUMENT;
+    if (!lit || !plain || !ssdgs_model_settings(plain)->baked)
+        return ssdgs_context_fail(context, SSDGS_ERR_ARGUMENT,
+                                  !lit     ? "unbake_model: lit is NULL"
+                                  : !plain ? "unbake_model: plain is NULL"
+                                           : "unbake_model: plain is not baked, it takes light as it is");
     memset(&u, 0, sizeof u);
     u.options = options ? options : &none;
-    if (u.options->eye_count < 0 || u.options->eye_count > UNBAKE__SKY ||
-        (u.options->eye_count && !u.options->eyes))
-        return SSDGS_ERR_ARGUMENT;
-    for (int i = 0; i < 27; i++) u.told |= u.options->ambient[i / 3][i % 3] != 0;
+    const ssdgs_result wrong = unbake__check(&u, context);
+    if (wrong) return wrong;
     u.plain = plain;
     u.count = ssdgs_model_count(plain);
     const size_t n = (size_t)u.count + 1; /* none is no failure */
@@ -558,8 +603,11 @@ static inline ssdgs_result unbake_model(ssdgs_context *context, ssdgs_model *pla
     ssdgs_result result =
         u.seen && u.splat && u.tree && u.neighbours && u.tells && u.across && u.albedo && u.averaged
             ? ssdgs_model_bounds(plain, u.low, u.high)
-            : SSDGS_ERR_MEMORY;
+            : ssdgs_context_fail(context, SSDGS_ERR_MEMORY, "unbake_model: out of memory");
     for (int c = 0; c < 3 && !result; c++) u.size = fmax(u.size, (double)(u.high[c] - u.low[c]));
+    if (u.size > 1e15)
+        result = unbake__refuse(context, SSDGS_ERR_ARGUMENT,
+                                "it reaches over more than 1e15, does a Gaussian stray? ", u.size);
     if (!result) result = unbake__find(&u, context);
     if (!result) result = unbake__make(&u, context, lit);
     free(u.seen), free(u.splat), free(u.tree), free(u.neighbours), free(u.tells), free(u.across);

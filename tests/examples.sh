@@ -427,6 +427,14 @@ for wrong in "--ambient 1,1" "--ambient 1,1,1," "--ambient -1,1,1" "--medium nan
 done
 check "unbake --keep 2" says 1 "kept = 2 is not within 0 .. 1" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" --keep 2
 check "unbake --roughness 2" says 1 "roughness" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" --roughness 2
+check "unbake --f0 2" says 1 "f0 is not above 0, up to 1: 2" "$build/unbake" "$out/baked.ply" -o "$out/lit2.ply" --f0 2
+{
+    printf 'ply\nformat ascii 1.0\nelement vertex 1\n'
+    for p in x y z f_dc_0 f_dc_1 f_dc_2 f_rest_0 f_rest_1 f_rest_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3; do echo "property float $p"; done
+    printf 'end_header\n0 0 0 0 0 0 1 1 1 2 -2 -2 -3 1 0 0 0\n'
+} >"$out/rest.ply"
+check "unbake says what it leaves out" says 0 "f_rest is left out" "$build/unbake" "$out/rest.ply" -o "$out/lit2.ply" --keep 1
+check "and not that light changes nothing" lacks "change nothing"
 
 rm -rf "$out"
 echo "$passed passed, $failed failed"

@@ -116,7 +116,8 @@ static void take_away(device *d, ssdgs_frame *frame, int stage) {
 static ssdgs_result on_device(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
     device *d = (device *)user;
     bring_back(d);
-    if (d->fails == (int)stage + 1) return ssdgs_stage_fail(frame, SSDGS_ERR_MEMORY, "the device is full");
+    if (d->fails == (int)stage + 1)
+        return ssdgs_context_fail(frame->context, SSDGS_ERR_MEMORY, "the device is full");
     const ssdgs_result result = ssdgs_stage_cpu(frame, stage);
     d->stages++;
     d->memory = frame->memory;
@@ -138,7 +139,7 @@ static ssdgs_result fetch(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
     CHECK(stage == SSDGS_STAGE_COUNT || !(d->mask >> stage & 1));
     CHECK(frame->last >= SSDGS_STAGE_WALK);
     bring_back(d);
-    return d->fails == -1 ? ssdgs_stage_fail(frame, SSDGS_ERR_IO, "the device is gone") : SSDGS_OK;
+    return d->fails == -1 ? ssdgs_context_fail(frame->context, SSDGS_ERR_IO, "the device is gone") : SSDGS_OK;
 }
 
 static void released(void *user, const void *gone) {
@@ -294,7 +295,7 @@ static void test_failures(void) {
         CHECK(!strcmp(ssdgs_error_message(context), stage < 0 ? "the device is gone" : "the device is full"));
         d.fails = 0;
     }
-    CHECK(ssdgs_stage_fail(NULL, SSDGS_ERR_IO, "") == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_context_fail(NULL, SSDGS_ERR_IO, "") == SSDGS_ERR_ARGUMENT);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }

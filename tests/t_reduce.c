@@ -292,6 +292,7 @@ static void test_edges(void) {
         const ssdgs_model_view v = ssdgs_model_arrays(models[i]);
         const ssdgs_settings before = *ssdgs_model_settings(models[i]);
         CHECK(reduce_model(contexts[i], &models[i], 0) == SSDGS_ERR_ARGUMENT);
+        CHECK(strstr(ssdgs_error_message(contexts[i]), "count < 1") != NULL);
         CHECK(!reduce_model(contexts[i], &models[i], 1500) && ssdgs_model_arrays(models[i]).count == 1500);
         v.gaussians[7] = NAN;                            /* never drawn: it goes */
         v.gaussians[SSDGS_DIFFUSE * v.stride + 9] = NAN; /* drawn black */

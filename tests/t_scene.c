@@ -1398,6 +1398,10 @@ static void test_shadow_map_frames(void) {
               (wrong == 7 ? SSDGS_ERR_NONFINITE : SSDGS_ERR_ARGUMENT));
         if (!CHECK(strstr(ssdgs_error_message(context), "shadow map") != NULL))
             printf("    %s\n", ssdgs_error_message(context));
+        char pitch[80]; /* numbers of a pointer's width in words */
+        sprintf(pitch, "pitch = %d, where a row has %d bytes", (int)bad.pitch, 4 * MAP);
+        if (!CHECK(wrong < 10 || strstr(ssdgs_error_message(context), pitch)))
+            printf("    %s\n", ssdgs_error_message(context));
     }
     ssdgs_scene_occlude(scene, NULL);
     ssdgs_model_destroy(ball);
@@ -1763,6 +1767,9 @@ static void test_matrices(void) {
         CHECK(ssdgs_depth_from_buffer(context, p, 8, buffer, 320, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
         CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, 320, 0, 50, depth) == SSDGS_ERR_ARGUMENT);
         CHECK(ssdgs_depth_from_buffer(context, p, 0, NULL, 320, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, 320, 1 << 29, 1, depth) == SSDGS_ERR_ARGUMENT);
+        CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, -316, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
+        CHECK(strstr(ssdgs_error_message(context), "80 x 50 pixels, pitch -316") != NULL);
         for (int c = 0; c < 2; c++) p[column_major ? 4 * c + 2 : 8 + c] = 0;
         /* the same camera from a world whose x is turned round: left-handed */
         for (int i = 0; i < 3; i++) v[column_major ? i : 4 * i] *= -1;
@@ -2507,6 +2514,7 @@ static void test_moved_over(void) {
     context = was;
     CHECK(ssdgs_model_move(NULL, context) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_model_move(model, NULL) == SSDGS_ERR_ARGUMENT);
+    CHECK(strstr(ssdgs_error_message(context), "ssdgs_model_move: to is NULL") != NULL);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(counted);
     CHECK(memory.live == 0);

@@ -364,9 +364,10 @@ static void test_bad_spz(ssdgs_context *context) {
     static const struct {
         int at, value;
         const char *says;
-    } wrong[] = {{0, 'M', "gzip, but no SPZ"}, {4, 0, "version 0"},   {4, 4, "version 4"},
-                 {12, 4, "degree 4"},          {12, 3, "ends early"}, {14, 2, "extensions"},
-                 {10, 200, "ends early"}};
+    } wrong[] = {{0, 'M', "gzip, but no SPZ"}, {4, 0, "version 0"},
+                 {4, 4, "version 4"},          {12, 4, "degree 4"},
+                 {12, 3, "which are not"},     {14, 2, "extensions"},
+                 {10, 200, "which are not"},   {8, POINTS - 1, "which are not"}};
     char error[512];
     spz(&raw, 2, POINTS, 1, 12);
     for (size_t i = 0; i < sizeof wrong / sizeof *wrong; i++) {

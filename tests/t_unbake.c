@@ -362,8 +362,10 @@ static void test_edges(void) {
     CHECK(fabs((double)g.sharpness[0] - 1 / 0.09) < 1e-3);
     ssdgs_model *lit = model;
     CHECK(unbake_model(context, model, NULL, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+    CHECK(strstr(ssdgs_error_message(context), "plain is not baked") != NULL);
     ssdgs_model_destroy(model);
     CHECK(unbake_model(context, NULL, NULL, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+    CHECK(strstr(ssdgs_error_message(context), "plain is NULL") != NULL);
 
     for (int count = 0; count < 2; count++) {
         model = plain_model(context, count);
@@ -386,9 +388,45 @@ static void test_edges(void) {
 
     model = plain_model(context, 3);
     lit = model;
-    options.roughness = 2;
-    CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
-    CHECK(strstr(ssdgs_error_message(context), "roughness") != NULL);
+    static const ssdgs_real eye[1][3] = {{0, (ssdgs_real)NAN, 0}};
+    for (int wrong = 0; wrong < 13; wrong++) {
+        static const char *const says[13] = {"roughness is neither 0 nor 0.01 .. 1: 2",
+                                             "roughness is neither 0 nor 0.01 .. 1: -1",
+                                             "roughness is neither 0 nor 0.01 .. 1: nan",
+                                             "f0 is not above 0, up to 1: 2",
+                                             "f0 is not above 0, up to 1: nan",
+                                             "ambient is not finite, or its mean is negative: nan",
+                                             "or its mean is negative: -5",
+                                             "ambient is not finite, or its mean is negative: inf",
+                                             "a place of eyes is not finite or too far",
+                                             "eyes is NULL, eye_count 1",
+                                             "eye_count is not 0 .. 32: 33",
+                                             "kept",
+                                             "scattering or absorption is below 0: -1"};
+        options = unbake_options_default();
+        if (wrong < 3) options.roughness = (ssdgs_real)(wrong == 0 ? 2 : wrong == 1 ? -1 : NAN);
+        if (wrong == 3 || wrong == 4) options.f0 = (ssdgs_real)(wrong == 3 ? 2 : NAN);
+        if (wrong == 5) options.ambient[8][1] = (ssdgs_real)NAN;
+        if (wrong == 6) options.ambient[0][2] = -5;
+        if (wrong == 7) options.ambient[0][0] = (ssdgs_real)INFINITY;
+        if (wrong == 8) options.eyes = eye;
+        if (wrong == 8 || wrong == 9) options.eye_count = 1;
+        if (wrong == 10) options.eye_count = 33;
+        if (wrong == 11) options.kept = (ssdgs_real)NAN;
+        if (wrong == 12) options.scattering[1] = -1;
+        lit = model;
+        CHECK(unbake_model(context, model, &options, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+        if (!CHECK(strstr(ssdgs_error_message(context), says[wrong])))
+            printf("    %d: %s\n", wrong, ssdgs_error_message(context));
+    }
+    options = unbake_options_default();
+    options.ambient[0][0] = options.ambient[0][1] = options.ambient[0][2] = (ssdgs_real)1e-30;
+    CHECK(unbake_model(context, model, &options, &lit) &&
+          strstr(ssdgs_error_message(context), "make an albedo"));
+    view = ssdgs_model_arrays(model);
+    view.gaussians[SSDGS_POSITION * view.stride] = (ssdgs_real)1e16;
+    CHECK(unbake_model(context, model, NULL, &lit) == SSDGS_ERR_ARGUMENT && !lit);
+    CHECK(strstr(ssdgs_error_message(context), "does a Gaussian stray") != NULL);
     ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }

@@ -1838,7 +1838,7 @@ static ssdgs_result gpu_answer(gpu *g, ssdgs_frame *frame, const char *what) {
     g->picture.buffer = 0;
     memset(g->maps, 0, sizeof g->maps);
     for (int i = 0; i < GPU_LAMPS; i++) g->frame.light[i].ready = 0;
-    return ssdgs_stage_fail(frame, result, g->message);
+    return ssdgs_context_fail(frame->context, result, g->message);
 }
 
 static ssdgs_result gpu_stage(void *user, ssdgs_frame *frame, ssdgs_stage stage) {
