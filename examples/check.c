@@ -498,7 +498,7 @@ int main(int argc, char **argv) {
     k.options = ssdgs_train_options_default();
     k.train_json = "transforms_train.json";
     for (int i = 1; i < argc; i++) {
-        if (!strcmp(argv[i], "--out") && i + 1 < argc) k.out = argv[++i];
+        if (!strcmp(argv[i], "--out") && i + 1 < argc && *argv[i + 1]) k.out = argv[++i];
         else if (!strcmp(argv[i], "--train-json") && i + 1 < argc) k.train_json = argv[++i];
         else if (!strcmp(argv[i], "--downscale") && i + 1 < argc) {
             double times;

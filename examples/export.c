@@ -565,7 +565,9 @@ int main(int argc, char **argv) {
         } else if (argv[i][0] != '-' && given < 2) names[given++] = argv[i];
         else return usage();
     }
-    if (given < 2 || strlen(names[1]) > OLAT__MAX_PATH - 16) return usage();
+    const size_t length = given < 2 ? 0 : strlen(names[1]);
+    if (!length || length > OLAT__MAX_PATH - 16 || strchr(OLAT__SEPARATORS, names[1][length - 1]))
+        return usage();
     memset(&guard, 0, sizeof guard);
     int failed = olat_guard_input(&guard, names[0], error);
     for (int i = 0; i <= FILES && !failed; i++) {

@@ -182,14 +182,13 @@ OLAT__API int olat__write_file(const char *path, const unsigned char *data, size
 /* Whether a file could be written: neither it nor what is there changes. */
 OLAT__API int olat_check_writable(const char *path, char error[512]) {
     const size_t room = strlen(path) + 40;
+    struct stat info;
+    if (stat(path, &info) == 0 && !S_ISREG(info.st_mode))
+        return olat__fail(error, "%s: cannot be written: it is a folder or a device", olat__tail(path));
     char *name = (char *)malloc(room);
-    int file = -1;
     if (!name) return olat__fail(error, "%s: out of memory", olat__tail(path));
     snprintf(name, room, "%s.tmp.%ld", path, (long)getpid());
-    struct stat info;
-    if (stat(path, &info) != 0 || S_ISREG(info.st_mode)) file = open(name, OLAT__WRITE_FLAGS, 0666);
-    else errno = EISDIR;
-    const int reason = errno;
+    const int file = open(name, OLAT__WRITE_FLAGS, 0666), reason = errno;
     if (file >= 0) close(file), remove(name);
     free(name);
     return file < 0 ? olat__fail(error, "%s: cannot be written: %s", olat__tail(path), strerror(reason)) : 0;
@@ -336,10 +335,11 @@ OLAT__API int olat_guard_input(olat_guard *guard, const char *path, char error[5
     return olat__guard_add(guard, path, olat__identify(path, id) ? id : NULL, 0, error);
 }
 
-/* A file to be written: fails where it is an input, or was named as an output before, if only in other
-   case. */
+/* A file to be written: fails where its name is empty, it is an input, or was named as an output before, if
+   only in other case. */
 OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[512]) {
     olat__known file;
+    if (!*path) return olat__fail(error, "an output's name is empty");
     file.name = "";
     const olat__known *input;
     if (guard->room && olat__identify(path, file.id) && (input = olat__slot(guard, &file))->path) {

@@ -226,7 +226,7 @@ static inline int judge__bounds(const judge__capture *k, int within) {
     if ((!within && outside <= 0.1 * shown) || doubtful || !(half > 0)) return 0;
     const double step = pow(10, floor(log10(half)) - 1);
     for (int j = 0; j < 3; j++) x[j] += (double)k->settings->origin[j];
-    judge__note(k, "the object lies about within bounds_min=%g,%g,%g bounds_max=%g,%g,%g",
+    judge__note(k, "the object lies about within bounds_min=%.9g,%.9g,%.9g bounds_max=%.9g,%.9g,%.9g",
                 step * floor((x[0] - half) / step), step * floor((x[1] - half) / step),
                 step * floor((x[2] - half) / step), step * ceil((x[0] + half) / step),
                 step * ceil((x[1] + half) / step), step * ceil((x[2] + half) / step));

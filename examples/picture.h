@@ -48,13 +48,13 @@ static const struct {
     double least, most, usual[3];
 } view__field[VIEW__FIELDS] = {
     {"w", 1, 16, VIEW__SIDE, {256, 0, 0}}, {"h", 1, 16, VIEW__SIDE, {256, 0, 0}},
-    {"eye", 3, -1e6, 1e6, {0, -3, 1}},     {"target", 3, -1e6, 1e6, {0, 0, 0}},
+    {"eye", 3, -1e15, 1e15, {0, -3, 1}},   {"target", 3, -1e15, 1e15, {0, 0, 0}},
     {"up", 3, -1, 1, {0, 0, 1}},           {"angle", 1, 0.05, 2.5, {0.7, 0, 0}},
     {"exposure", 1, 1e-3, 1e3, {1, 0, 0}}, {"ambient", 3, 0, 1e3, {0, 0, 0}},
     {"tint", 3, 0, 100, {1, 1, 1}},        {"roughness", 1, 0.1, 10, {1, 0, 0}},
     {"gloss", 1, 0, 100, {1, 0, 0}},       {"translucency", 1, 0.1, 10, {1, 0, 0}},
     {"lit", 1, 0, 1, {0, 0, 0}},           {"kept", 1, -1, 1, {-1, 0, 0}},
-    {"light", 6, -1e6, 1e6, {0, 0, 0}}}; /* place and colour, once for each light */
+    {"light", 6, -1e15, 1e15, {0, 0, 0}}}; /* place and colour, once for each light */
 
 typedef struct view__wish {
     double value[VIEW__FIELDS][3], light[VIEW__LIGHTS][6];

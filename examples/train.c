@@ -229,6 +229,7 @@ static const char *set_field(ssdgs_settings *settings, ssdgs_train_options *opti
             int whole = value > -2e9 && value < 2e9 ? (int)value : 0;
             if (end == p + 1 || (*end && *end != ',')) return problem;
             if (!f->reals && !(value >= whole && value <= whole)) return problem;
+            if (f->in == IN_CORNERS && !(fabs(value) < HUGE_VAL)) return problem;
             if (f->in == IN_CORNERS) memcpy(to + (size_t)n * sizeof value, &value, sizeof value);
             else if (f->reals) memcpy(to + (size_t)n * sizeof real, &real, sizeof real);
             else memcpy(to, &whole, sizeof whole);
@@ -264,7 +265,8 @@ static int number(const char *const *given, int option, int least, int *value) {
     const long parsed = strtol(given[option], &end, 10);
     if (end == given[option] || *end || parsed < least || parsed > 2000000000) {
         char problem[64];
-        snprintf(problem, sizeof problem, "%s needs a number from %d up, not", option_names[option], least);
+        snprintf(problem, sizeof problem, "%s needs a number from %d to 2000000000, not",
+                 option_names[option], least);
         return usage(problem, given[option]), 0;
     }
     *value = (int)parsed;
@@ -805,6 +807,9 @@ static int train(job *j) {
     j->progress.terminal = on_terminal();
     j->progress.first = -1;
     signal(SIGINT, on_interrupt);
+#ifdef SIGXFSZ
+    signal(SIGXFSZ, SIG_IGN); /* a file that may not grow is an error as any other */
+#endif
     while ((result = ssdgs_trainer_run(j->trainer, progress, &j->progress)) == SSDGS_ERR_CANCELLED) {
         if (j->best && is_due(&j->progress, j->progress.judge_every, j->progress.done) && judge(j))
             return fail(ssdgs_error_message(j->context));
@@ -828,10 +833,10 @@ static int train(job *j) {
     if (result) return fail_of(j);
     const int saved = !(j->best ? judge(j) : ssdgs_model_save(j->model, output));
     if (!saved) fail(ssdgs_error_message(j->context));
-    if (ssdgs_trainer_save(j->trainer, j->checkpoint)) return fail(ssdgs_error_message(j->context));
-    if (!saved)
-        return sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint),
-               fail(error);
+    const int lost = ssdgs_trainer_save(j->trainer, j->checkpoint) && fail(ssdgs_error_message(j->context));
+    if (!saved && !lost)
+        sprintf(error, "the trained model is in %.440s; --resume saves it", j->checkpoint), fail(error);
+    if (!saved) return 1;
     if (j->best && keep_best(j, error)) return fail(error);
     char text[32];
     if (refines && save_refined(j, error)) return fail(error);
@@ -851,7 +856,7 @@ static int train(job *j) {
             "them\n",
             j->options.max_gaussians);
     if (j->options.refine & SSDGS_REFINE_AMBIENT) tell_ambient(ssdgs_model_settings(j->model));
-    if (!has_test) return 0;
+    if (!has_test) return lost;
     j->test_photos = olat_photos(&j->test_set);
     if (!j->test_photos) return fail("out of memory");
     result = evaluate(j, j->test_photos, j->test_set.count, 1, 0, "test");
@@ -859,7 +864,7 @@ static int train(job *j) {
         result = evaluate(j, j->test_photos, j->test_set.count, 1, 200,
                           "test (each photograph's pose and light fitted to it)");
     if (!result) result = evaluate(j, j->photos, j->count, (j->count + 39) / 40, 0, "training");
-    if (!result) return 0;
+    if (!result) return lost;
     return fail(result == SSDGS_ERR_MEMORY ? "out of memory" : ssdgs_error_message(j->context));
 }
 

@@ -148,7 +148,9 @@ static size_t view__header(const char *request, const char *name, const char **a
         while (i < length && (line[2 + i] | 32) == name[i]) i++;
         if (i < length || line[2 + i] != ':') continue;
         *at = line + 3 + i + strspn(line + 3 + i, " \t");
-        return strcspn(*at, "\r\n");
+        size_t size = strcspn(*at, "\r\n");
+        while (size && strchr(" \t", (*at)[size - 1])) size--;
+        return size;
     }
     *at = NULL;
     return 0;
@@ -162,7 +164,7 @@ static int view__is_here(const view_server *s, const char *prefix, const char *t
         const int size = snprintf(here, sizeof here, "%s%s:%d", prefix, hosts[i], s->port);
         /* browsers leave out :80 */
         if (((size_t)size == length || (s->port == 80 && length + 3 == (size_t)size)) &&
-            !memcmp(here, text, length))
+            olat__same_letters(text, here, length))
             return 1;
     }
     return 0;
@@ -173,7 +175,14 @@ static void view__serve(view_server *s, view__visitor *v, char *request) {
     const char *value;
     char *path, *rest, *query;
     size_t length = view__header(request, "connection", &value);
-    if (length == 5 && olat__same_letters(value, "close", 5)) v->leaves = 1;
+    v->leaves = !!strstr(request, " HTTP/1.0\r\n"); /* unless it asks for more */
+    for (size_t i = 0; i < length; i += strcspn(value + i, ", \t\r") + 1) {
+        if (olat__same_letters(value + i, "keep-alive", 10)) v->leaves = 0;
+        if (olat__same_letters(value + i, "close", 5)) {
+            v->leaves = 1;
+            break;
+        }
+    }
     length = view__header(request, "host", &value);
     if (!view__is_here(s, "", value, length)) {
         view__refuse(v, "403 Forbidden", "this is another host\n");
@@ -238,6 +247,9 @@ static void view__leave(view__visitor *v) {
 /* The first whole request among what came, if no answer is on its way. */
 static void view__next_request(view_server *s, view__visitor *v) {
     v->in[v->got] = 0;
+    const size_t blank = strspn(v->in, "\r\n"); /* between requests */
+    v->got -= blank;
+    memmove(v->in, v->in + blank, v->got + 1);
     char *stop = strlen(v->in) == v->got ? strstr(v->in, "\r\n\r\n") : NULL;
     if (v->size) return;
     if (strlen(v->in) < v->got) view__refuse(v, "400 Bad Request", "a zero byte\n");

@@ -120,6 +120,19 @@ const served = async () => {
         last = now
         await picture(name.replace(/ /g, '_'))
     }
+    await ask('$("exposure").value = -4, $("exposure").dispatchEvent(new Event("input"))')
+    await rest()
+    check('exposure shows', (await pixels())[0] != last[0])
+    await ask('$("reset").click()')
+    await rest()
+    check('start again takes back all', (await pixels())[0] == last[0] && await ask('$("exposure").value') == '0')
+    check('a press on the facts is one on the picture', await ask(`(() => {
+        const r = $('facts').getBoundingClientRect(); return document.elementFromPoint(r.x + r.width / 2, r.y + r.height / 2) == canvas })()`))
+    await resize(3840, 2160)
+    const wide = await ask('(() => { const w = wish(true), s = $("stage"); return [w.w, w.w / w.h / s.clientWidth * s.clientHeight] })()')
+    check(`a large screen's picture is not stretched: ${wide}`, wide[0] == 2560 && Math.abs(wide[1] - 1) < 0.001)
+    await resize(960, 600)
+    await rest()
     await step('drag', () => drag(120, 40), 'eye')
     await step('arrow key', () => key('ArrowLeft'), 'eye')
     await step('plus key', () => key('+', '+'), 'eye')

@@ -405,6 +405,18 @@ check "with its page" says 0 "^http://127.0.0.1:" view_from / "$absolute/example
 # options of ball may stand anywhere
 check "--focal 1e999" says 2 "^usage: ball" "$build/ball" 20 20 10 "$set/test/r_000.png" --focal 1e999
 check "bounds the wrong way round" says 2 "first corner" "$build/check" "$set" --bounds 1,1,1,0,0,0
+check "train -o nothing" says 1 "output's name is empty" "$build/train" "$set" -o ""
+check "train -o /dev/null" says 1 "a folder or a device" "$build/train" "$set" -o /dev/null
+check "train --set bounds_min=nan" says 2 "cannot set .*bounds_min=nan" "$build/train" "$set" -o "$out/lit2.ply" --set bounds_min=nan,0,0
+check "train --iterations, too many" says 2 "from 1 to 2000000000, not" "$build/train" "$set" -o "$out/lit2.ply" --iterations 99999999999
+# a checkpoint that finds no room: the model is there, and tested
+"$build/train" "$set" -o "$out/small.ply" --iterations 10 --points 300 >/dev/null 2>&1
+(ulimit -f $(($(wc -c <"$out/small.ply") / 512 + 8)); says 1 "small.ply.ckpt: cannot be" "$build/train" "$set" -o "$out/small.ply" --iterations 10 --points 300 --seed 2) && code=0 || code=1
+check "a full disk" test $code = 0
+check "and what was trained" grep -q "^test: PSNR" "$out/log"
+check "check --out nothing" says 2 "^usage: check" "$build/check" "$set" --out ""
+check "export to nothing" says 2 "^usage: export" export_of "$model" ""
+check "export to a folder" says 2 "^usage: export" export_of "$model" "$out/"
 check "engine --frames 2abc" says 2 "^usage: engine" engine --frames 2abc
 check "--light a b c" says 2 "^usage: export" export_of "$model" "$out/unlit" --light a b c
 check "ball" says 1 "r_000.png: " "$build/ball" --focal 500 20 20 10 "$set/test/r_000.png"

@@ -107,6 +107,17 @@ static int asks(const char *format, const char *want) {
     return status;
 }
 
+/* Whether it hangs up after the answer. */
+static int hangs_up(const char *format) {
+    char request[512], byte;
+    snprintf(request, sizeof request, format, here.port);
+    const int s = visit();
+    tell(s, request, strlen(request));
+    const int left = hear(s, NULL, NULL) == 200 && recv(s, &byte, 1, 0) == 0;
+    close(s);
+    return left;
+}
+
 static void test_wishes(void) {
     static const struct {
         const char *text;
@@ -115,6 +126,7 @@ static void test_wishes(void) {
         {"", 1},
         {"w=320&h=240&eye=0,-2,1.5e0&plane=normal&preset=exact", 1},
         {"light=1,2,3,1,1,1&light=-1,2,3,0,0,0.5", 1},
+        {"eye=5e6,4000000,3000001.5&target=5e6,4e6,3e6&light=5e6,4e6,3e6,1,1,1", 1},
         {"w=15", 0},
         {"w=2561", 0},
         {"w=1e99", 0},
@@ -184,6 +196,10 @@ static void test_answers(void) {
     CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nContent-Length: 0\r\n\r\n", "the page") == 200);
     CHECK(asks("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nTransfer-Encoding: chunked\r\n\r\n", "no body") ==
           400);
+    CHECK(asks("\r\nGET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\n\r\n", "the page") == 200);
+    CHECK(asks("GET / HTTP/1.1\r\nHost: LocalHost:%d \t\r\n\r\n", "the page") == 200);
+    CHECK(hangs_up("GET / HTTP/1.0\r\nHost: 127.0.0.1:%d\r\n\r\n"));
+    CHECK(hangs_up("GET / HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nConnection: keep-alive, Close\r\n\r\n"));
     CHECK(asks("GET / HTTP/3\r\nHost: 127.0.0.1:%d\r\n\r\n", "no HTTP") == 400);
     CHECK(asks("GET /\r\nHost: 127.0.0.1:%d\r\n\r\n", "no HTTP") == 400);
     CHECK(asks("Host: 127.0.0.1:%d\r\n\r\n", "host") == 403);
