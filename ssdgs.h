@@ -1897,8 +1897,10 @@ static void ssdgs__tell(ssdgs_context *context, ssdgs_result code, const char *m
     SSDGS__PUBLISH(&context->telling, 0);
 }
 
+static ssdgs_result ssdgs__fail(ssdgs_context *, ssdgs_result, const char *, ...) SSDGS__FORMAT(3);
+static void ssdgs__note(ssdgs_context *, const char *, ...) SSDGS__FORMAT(2);
+
 /* Records what went wrong, tells the log, returns the code; without a context, that alone. */
-SSDGS__FORMAT(3)
 static ssdgs_result ssdgs__fail(ssdgs_context *context, ssdgs_result code, const char *format, ...) {
     size_t at = 0;
     if (!context) return code;
@@ -1925,7 +1927,7 @@ static ssdgs_result ssdgs__null(ssdgs_context *context, const char *function, co
 }
 
 /* What is no failure, for the log alone. */
-SSDGS__FORMAT(2) static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
+static void ssdgs__note(ssdgs_context *context, const char *format, ...) {
     char text[SSDGS__MESSAGE] = "";
     size_t at = 0;
     va_list arguments;

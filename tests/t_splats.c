@@ -377,6 +377,8 @@ static void test_bad_spz(ssdgs_context *context) {
         raw.bytes[wrong[i].at] = good;
         if (!CHECK(!unpacked(context, &f, error) && strstr(error, wrong[i].says))) printf("    %s\n", error);
     }
+    gzip(&f, raw.bytes, raw.size + 1, 0);
+    CHECK(!unpacked(context, &f, error) && strstr(error, "which are not"));
     gzip(&f, raw.bytes, 10, 0);
     CHECK(!unpacked(context, &f, error) && strstr(error, "gzip, but no SPZ"));
     spz(&raw, 3, 2, 1, 12);
