@@ -374,11 +374,12 @@ static inline ssdgs_result reduce_model(ssdgs_context *context, ssdgs_model **mo
     desc.threads = ssdgs_context_threads(context);
     desc.isa = ssdgs_context_isa(context);
     desc.gpu = &hook;
-    const int enough = !result;
-    if (!result) result = ssdgs_context_create(&desc, &r.context);
-    if (!result) result = reduce__rows(&r, count);
-    if (result && enough)
-        ssdgs_context_fail(context, result, r.context ? ssdgs_error_message(r.context) : "out of memory");
+    if (!result) {
+        result = ssdgs_context_create(&desc, &r.context);
+        if (!result) result = reduce__rows(&r, count);
+        if (result)
+            ssdgs_context_fail(context, result, r.context ? ssdgs_error_message(r.context) : "out of memory");
+    }
     ssdgs_context_destroy(r.context);
     ssdgs_model *fewer = NULL;
     if (!result) result = ssdgs_model_create(context, ssdgs_model_settings(*model), r.count, &fewer);

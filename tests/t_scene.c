@@ -1398,7 +1398,7 @@ static void test_shadow_map_frames(void) {
               (wrong == 7 ? SSDGS_ERR_NONFINITE : SSDGS_ERR_ARGUMENT));
         if (!CHECK(strstr(ssdgs_error_message(context), "shadow map") != NULL))
             printf("    %s\n", ssdgs_error_message(context));
-        char pitch[80]; /* numbers of a pointer's width in words */
+        char pitch[80];
         sprintf(pitch, "pitch = %d, where a row has %d bytes", (int)bad.pitch, 4 * MAP);
         if (!CHECK(wrong < 10 || strstr(ssdgs_error_message(context), pitch)))
             printf("    %s\n", ssdgs_error_message(context));
