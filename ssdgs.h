@@ -173,17 +173,13 @@ BESIDE IT, in examples/, headers on this interface
   corrects small errors), traces light between objects, or compresses models.
 
 CHANGES, for programs written for 0.2.4
-  a sun's `position`             its `direction` is -position: ssdgs_light_directional(direction, ..)
-  ssdgs_model_reduce(model, n)   reduce_model(context, &model, n) of examples/reduce.h: another model
-  ssdgs_environment(context, ..) sky_lights(..) of examples/sky.h, which returns what is wrong
-  ssdgs_model_adopt(model, from) adopt_model(context, &model, ..) of examples/adopt.h: another model
-  notes on captures              judge_photos() of examples/judge.h; the trainer notes what it decides itself
-  ssdgs_checkpoint_iteration(..) another argument: of how many iterations
-  {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _directional(), _spot()
-  a hook's view is `cached` 1    2; 1 says that WALK is to be done again
-  ssdgs_stage_fail(frame, ..)    ssdgs_context_fail(frame->context, ..)
-  ssdgs_scene_light(.., lights)  the camera before the lights, or NULL
-  ssdgs_to_pixels(image, ..)     ssdgs_to_pixels(context, image, ..), and ssdgs_blend_pixels() alike
+  ssdgs_model_reduce, _adopt     reduce_model() of examples/reduce.h, adopt_model() of adopt.h: other models
+  ssdgs_environment, and notes   sky_lights() of examples/sky.h; judge_photos() of judge.h notes on captures
+  {SSDGS_LIGHT_POINT, ..}        ssdgs_light_point(), _spot(); _directional(-position, ..) for a sun
+  another argument               ssdgs_checkpoint_iteration() has the run's length, ssdgs_scene_light() the
+                                 camera before the lights, _to_pixels() and _blend_pixels() the context first
+  ssdgs_stage_fail(frame, ..)    ssdgs_context_fail(frame->context, ..); a hook's view is `cached` 2 for 1:
+                                 1 says that WALK is to be done again
   options.max_gaussians          what training ends with; before it may have options.surplus times as many
   image.scene_depth              hides at each pixel by a Gaussian's mean depth there, not by its centre's
   raw planes of a baked model    14, and f_rest behind: ssdgs_model_view.channels; SSDGS_DIFFUSE is f_dc
