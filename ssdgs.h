@@ -539,15 +539,16 @@ SSDGS_API ssdgs_result ssdgs_depth_from_buffer(ssdgs_context *context, const ssd
    color. Beside an object with deferred highlights, scattering has all light of those without, and baked and
    kept colours but for lights' shares of them, which diffuse has. */
 typedef struct ssdgs_image {
-    int stride;               /* pixels from row to row; 0 = camera width */
-    ssdgs_real *color;        /* (h,w,3) */
-    ssdgs_real *alpha;        /* (h,w) */
-    ssdgs_real *depth;        /* (h,w) sum of weight x camera depth: divide by alpha */
-    ssdgs_real *normal;       /* (h,w,3) sum of weight x normal, world */
-    ssdgs_real *diffuse;      /* (h,w,3) */
-    ssdgs_real *specular;     /* (h,w,3) */
-    ssdgs_real *scattering;   /* (h,w,3) */
-    ssdgs_real *shadow;       /* (h,w) sum of weight x S, averaged over the lights */
+    int stride;             /* pixels from row to row; 0 = camera width */
+    ssdgs_real *color;      /* (h,w,3) */
+    ssdgs_real *alpha;      /* (h,w) */
+    ssdgs_real *depth;      /* (h,w) sum of weight x camera depth: divide by alpha */
+    ssdgs_real *normal;     /* (h,w,3) sum of weight x normal, world */
+    ssdgs_real *diffuse;    /* (h,w,3) */
+    ssdgs_real *specular;   /* (h,w,3) */
+    ssdgs_real *scattering; /* (h,w,3) */
+    ssdgs_real *shadow;     /* (h,w) sum of weight x S, averaged over the lights. While an object has deferred
+                               highlights, others' S is that of light maps */
     ssdgs_real *median_depth; /* (h,w) camera depth, at the pixel, of the Gaussian that takes transmittance
                                  below 1/2; 0: none does */
     const ssdgs_real *scene_depth; /* (h,w) read: camera depth, z, of meshes and the like: a Gaussian is not
@@ -1694,7 +1695,11 @@ static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *l
                                  const ssdgs_real *transmittance) {
     for (int i = 0; i < 256; i++) {
         ssdgs_light_pixel *at = tile->light_map + i;
-        for (int l = levels[i]; l < SSDGS__MAP_STEPS; l++) at->distance[l] = SSDGS__NEVER;
+        for (int l = levels[i]; l < SSDGS__MAP_STEPS; l++) {
+            at->distance[l] = SSDGS__NEVER;
+            if (l < 2) at->left[l] = 0;
+            if (l) at->before[l - 1] = 0;
+        }
         at->behind = transmittance[i];
     }
 }
@@ -4401,9 +4406,10 @@ SSDGS__SMALL_BEGIN
 
 /* Whether pixels are lit in the same way: by the same lobes, with the same kind of shadow. */
 static int ssdgs__lit_alike(const ssdgs__lighting *a, const ssdgs__lighting *b, int lights) {
-    if (!a->deferred || !b->deferred) return a->deferred == b->deferred;
+    if (a->deferred != b->deferred) return 0;
     for (int i = 0; i < lights; i++)
         if (a[i].shadow != b[i].shadow) return 0;
+    if (!a->deferred) return 1;
     return !memcmp(a->basis, b->basis, sizeof a->basis) && a->refined_shadow == b->refined_shadow &&
            a->residual_shadow == b->residual_shadow;
 }
@@ -4761,6 +4767,8 @@ static ssdgs_result ssdgs__begin_light(ssdgs_frame *frame, int index, int wanted
     SSDGS__TRY(ssdgs__views_reserve(frame, own->first + own->views));
     ssdgs__light_place(light, place);
     uint64_t key = ssdgs__views_key(frame, index, views, own->views);
+    const int cue = wanted & SSDGS__MADE_CUE; /* samples Gaussians that without it are known to be dark */
+    SSDGS__FOLD(key, cue);
     SSDGS__FOLD(key, light->kind);
     SSDGS__FOLD(key, place);
     SSDGS__FOLD(key, own->first);
@@ -5997,6 +6005,7 @@ static ssdgs_result ssdgs__transport(ssdgs_frame *frame, const ssdgs_real **sums
     for (const ssdgs_placed *o = frame->objects; o < frame->objects + frame->object_count; o++) {
         const int has = ssdgs__has_transport(o);
         SSDGS__FOLD(common, has);
+        SSDGS__FOLD(common, o->gaussians.count);
         SSDGS__FOLD(common, o->translucency);
     }
     for (int i = 0; i < frame->light_count; i++) {

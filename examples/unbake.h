@@ -12,7 +12,7 @@
    above: no direction from below it counts. A room is looked at from places in it, which options name.
 
    HOW WELL  Trained models, baked under an even sky and lit again by the lamps of their test photographs
-   (tests/unbaked.c), had 25 dB where things are matt, 34 where they are of wax that options tell, and 22
+   (tests/unbaked.c), had 26 dB where things are matt, 34 where they are of wax that options tell, and 22
    where they are of metal, which no colour tells. It takes some seconds for 150,000 Gaussians, so save the
    result. Its memory comes from malloc(). */
 
@@ -30,7 +30,8 @@
 #define UNBAKE__ROUNDS 10  /* of averaging albedos over them */
 #define UNBAKE__CHUNK 256  /* Gaussians of a task */
 #define UNBAKE__FLAT 0.85  /* cosine of the angle to a plane's normal within which a Gaussian lies in it */
-#define UNBAKE__THICK 0.06 /* of the model's size: half a plane's thickness */
+#define UNBAKE__LAYERS 64  /* heights, over twice the model's size */
+#define UNBAKE__THICK 4    /* of them: a plane */
 #define UNBAKE__BELOW 0.3  /* sine: directions count down to this angle below what things stand on */
 #define UNBAKE__LEAST 0.05 /* share of the sky that a Gaussian sees, at least */
 #define UNBAKE__MOST 0.95  /* of the surface: what sees or reflects more counts as what is at this share */
@@ -194,60 +195,69 @@ static inline ssdgs_result unbake__read(unbake__state *u) {
     return SSDGS_OK;
 }
 
-/* How flat it looks along a direction: the share of what is seen that lies in a plane across it. `plane` gets
-   that plane's normal, `middle` its place along the direction. */
+/* Along a plane's normal, from the middle of the bounds. */
+static inline double unbake__height(const unbake__state *u, const double normal[3], const unbake__splat *s) {
+    double height = unbake__dot(normal, s->position);
+    for (int c = 0; c < 3; c++) height -= normal[c] * ((double)u->low[c] + (double)u->high[c]) / 2;
+    return height;
+}
+
+/* The share of what is seen along a direction that lies in one plane across it. `plane` gets that plane's
+   normal, one of both, `middle` its height. */
 static inline double unbake__plane(const unbake__state *u, int k, double plane[3], double *middle) {
     const unsigned char *seen = u->seen + (size_t)k * (size_t)u->count;
-    double all = 1e-30, flat = 1e-30, within = 0;
-    *middle = 0;
-    memset(plane, 0, 3 * sizeof *plane);
+    double sum[3] = {0, 0, 0}, all = 1e-30, within = 0, layer[UNBAKE__LAYERS] = {0};
     for (int pass = 0; pass < 2; pass++) {
+        const double length = sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]) + 1e-30;
+        for (int c = 0; c < 3; c++) plane[c] = pass ? sum[c] / length : u->sky[k][c];
         for (int i = 0; i < u->count; i++) {
             const unbake__splat *s = u->splat + i;
-            const double along = unbake__dot(u->sky[k], s->axis), at = unbake__dot(u->sky[k], s->position);
-            const double weight = (double)s->weight * seen[i] * fabs(along);
+            const double along = unbake__dot(plane, s->axis),
+                         weight = (double)s->weight * seen[i] * fabs(unbake__dot(u->sky[k], s->axis)),
+                         at = UNBAKE__LAYERS / 2 * (1 + unbake__height(u, plane, s) / (u->size + 1e-30));
             if (!pass) all += weight;
             if (fabs(along) < UNBAKE__FLAT) continue;
-            if (!pass) flat += weight, *middle += weight * at;
-            else if (fabs(at - *middle) < UNBAKE__THICK * u->size) {
-                within += weight;
-                for (int c = 0; c < 3; c++) plane[c] += weight * (along < 0 ? -1 : 1) * (double)s->axis[c];
-            }
+            for (int c = 0; c < 3 && !pass; c++) sum[c] += weight * (along < 0 ? -1 : 1) * (double)s->axis[c];
+            if (pass && at >= 0 && at < UNBAKE__LAYERS) layer[(int)at] += weight;
         }
-        if (!pass) *middle /= flat;
     }
-    const double length = sqrt(plane[0] * plane[0] + plane[1] * plane[1] + plane[2] * plane[2]) + 1e-30;
-    for (int c = 0; c < 3; c++) plane[c] /= length;
+    for (int j = 0; j <= UNBAKE__LAYERS - UNBAKE__THICK; j++) {
+        double sum_of = 0;
+        for (int t = 0; t < UNBAKE__THICK; t++) sum_of += layer[j + t];
+        if (sum_of > within)
+            within = sum_of, *middle = u->size * ((2.0 * j + UNBAKE__THICK) / UNBAKE__LAYERS - 1);
+    }
     return within / all;
 }
 
-/* A plane that looks flat from some direction and has air on both sides is taken for what things stand on.
-   Photographs show it from above, so directions from below it do not count. */
+/* A plane that looks flat from some direction and has air on both sides is taken for what things stand on:
+   most of what else there is lies above it. Photographs show it from there, so directions from below it do
+   not count. */
 static inline void unbake__stand(unbake__state *u) {
-    double best = 0, down[3] = {0, 0, 0}, middle = 0, sides[2] = {0, 0};
-    int from = 0;
+    const double half = u->size * UNBAKE__THICK / UNBAKE__LAYERS;
+    double best = 0, up[3] = {0, 0, 0}, middle = 0, above = 0, seen[2] = {0, 0};
     for (int k = 0; k < UNBAKE__SKY; k++) {
-        double plane[3], at;
+        double plane[3], at = 0;
         const double share = unbake__plane(u, k, plane, &at);
         if (share <= best) continue;
-        best = share, from = k, middle = at;
-        memcpy(down, plane, sizeof down);
+        best = share, middle = at;
+        memcpy(up, plane, sizeof up);
     }
     for (int i = 0; i < u->count; i++) {
         const unbake__splat *s = u->splat + i;
-        if (fabs(unbake__dot(down, s->axis)) < UNBAKE__FLAT ||
-            fabs(unbake__dot(u->sky[from], s->position) - middle) >= UNBAKE__THICK * u->size)
-            continue;
+        const double height = unbake__height(u, up, s) - middle;
+        if (fabs(height) > half) above += height < 0 ? -(double)s->weight : (double)s->weight;
+        if (fabs(height) > half || fabs(unbake__dot(up, s->axis)) < UNBAKE__FLAT) continue;
         for (int k = 0; k < UNBAKE__SKY; k++) {
-            const double *d = u->sky[k], along = down[0] * d[0] + down[1] * d[1] + down[2] * d[2];
-            sides[along < 0] +=
+            const double *d = u->sky[k], along = up[0] * d[0] + up[1] * d[1] + up[2] * d[2];
+            seen[along > 0] +=
                 (double)s->weight * fabs(along) * u->seen[(size_t)k * (size_t)u->count + (size_t)i];
         }
     }
-    const int stands = best > 0.4 && sides[1] > 0.25 * sides[0];
+    const int stands = best > 0.4 && seen[above > 0] > 0.25 * seen[above <= 0];
     for (int k = 0; k < UNBAKE__SKY; k++) {
-        const double *d = u->sky[k];
-        u->used[k] = !stands || down[0] * d[0] + down[1] * d[1] + down[2] * d[2] < UNBAKE__BELOW;
+        const double *d = u->sky[k], along = up[0] * d[0] + up[1] * d[1] + up[2] * d[2];
+        u->used[k] = !stands || (above > 0 ? along : -along) > -UNBAKE__BELOW;
     }
 }
 
@@ -266,13 +276,10 @@ static inline void unbake__side_task(void *data, int chunk) {
     unbake__state *u = (unbake__state *)data;
     for (int i = chunk * UNBAKE__CHUNK; i < u->count && i / UNBAKE__CHUNK == chunk; i++) {
         unbake__splat *s = u->splat + i;
-        double sky[3] = {0, 0, 0}, open[3] = {0, 0, 0}, side = 0, n[3], length = 1e-30, share = 0;
+        double open[3] = {0, 0, 0}, side = 0, n[3], length = 1e-30, share = 0, d[3];
         for (int k = 0; k < u->sky_count; k++) {
-            const double seen = u->seen[(size_t)k * (size_t)u->count + (size_t)i] / (255.0 * u->sky_count);
-            double d[3];
+            const double seen = u->used[k] * u->seen[(size_t)k * (size_t)u->count + (size_t)i];
             unbake__toward(u, s, k, d);
-            for (int c = 0; c < 3; c++) sky[c] += seen * d[c];
-            if (!u->used[k]) continue;
             side += seen * unbake__dot(d, s->axis);
             for (int c = 0; c < 3; c++) open[c] += seen * d[c];
         }
@@ -282,9 +289,11 @@ static inline void unbake__side_task(void *data, int chunk) {
                    (1 - (double)s->flat) * open[c] / away;
             length += n[c] * n[c];
         }
-        for (int c = 0; c < 3; c++) {
-            s->normal[c] = (float)(n[c] / sqrt(length));
-            share += sky[c] * (double)s->normal[c];
+        for (int c = 0; c < 3; c++) s->normal[c] = (float)(n[c] / sqrt(length));
+        for (int k = 0; k < u->sky_count; k++) {
+            unbake__toward(u, s, k, d);
+            share += u->used[k] * u->seen[(size_t)k * (size_t)u->count + (size_t)i] *
+                     fmax(0, unbake__dot(d, s->normal));
         }
         s->share = (float)(u->options->eye_count ? 1 : share);
     }

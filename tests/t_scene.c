@@ -1700,6 +1700,23 @@ static void test_shader_maps(void) {
         CHECK(light == 5 ? !dark : dark > POINTS / 50);
         free(a), free(b);
     }
+    /* what a scene drew before is not left in its maps */
+    float *texels[2];
+    for (int way = 0; way < 2; way++) {
+        ssdgs_scene *fresh = NULL;
+        CHECK(!ssdgs_scene_create(context, &fresh));
+        lights[0].position[0] = (ssdgs_real)0.1;
+        if (!way) CHECK(!ssdgs_scene_light(fresh, object, 1, NULL, lights, 1, NULL));
+        lights[0].position[0] = 1;
+        CHECK(!ssdgs_scene_light(fresh, object, 1, NULL, lights, 1, NULL));
+        CHECK(!ssdgs_scene_light_map(fresh, 0, &map, NULL, NULL));
+        const size_t size = 4 * (size_t)map.faces * (size_t)map.size * (size_t)map.size;
+        texels[way] = (float *)calloc(2 * size, sizeof *texels[way]);
+        CHECK(!ssdgs_scene_light_map(fresh, 0, &map, texels[way], texels[way] + size));
+        if (way) CHECK(!memcmp(texels[0], texels[1], 2 * size * sizeof *texels[0]));
+        ssdgs_scene_destroy(fresh);
+    }
+    free(texels[0]), free(texels[1]);
     ssdgs_model_destroy(model);
 }
 
@@ -2241,6 +2258,107 @@ static void test_kept(void) {
     CHECK(shot->stats.gaussians == 0 && shot->value[15 * PIXELS] == 0);
 }
 
+/* Whether a frame of the scene is that of a new one, shot that of shot[1]. */
+static int as_new(const ssdgs_object *objects, int count, const ssdgs_camera *camera,
+                  const ssdgs_light *light, const ssdgs_render_options *options) {
+    ssdgs_scene *kept = scene;
+    together(objects, count, camera, light, 1, options, shot);
+    if (!CHECK(!ssdgs_scene_create(context, &scene))) exit(1);
+    together(objects, count, camera, light, 1, options, shot + 1);
+    ssdgs_scene_destroy(scene);
+    scene = kept;
+    return same(shot, shot + 1);
+}
+
+/* A light keeps its trees of transport while a model that it does not reach gives way to one of another size:
+   those behind it lie elsewhere, also for Gaussians that come into view. */
+static void test_moved_trees(void) {
+    const ssdgs_real eye[3] = {(ssdgs_real)-1.5, -2, (ssdgs_real)0.3}, target[3] = {-2, 0, 0},
+                     up[3] = {0, 0, 1};
+    const ssdgs_camera apart = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.35, SIDE, SIDE),
+                       all = camera_from(0.3, 3, 1);
+    const ssdgs_render_options options = ssdgs_render_options_default();
+    ssdgs_settings s = small_settings();
+    s.shadow.layers = s.scattering.layers = 0;
+    s.depth_cue = 0;
+    for (int c = 0; c < 3; c++) s.medium.scattering[c] = 20, s.medium.absorption[c] = (ssdgs_real)0.1;
+    ssdgs_model *models[4] = {cloud(&s, 0, 60, 0.3), cloud(&s, 400, 10, 0.3), cloud(&s, 800, 150, 0.5),
+                              cloud(&s, 600, 64, 0.3)};
+    ssdgs_light light = point_light(0, -1.5, 1.5);
+    light.range = 4;
+    ssdgs_object objects[3];
+    for (int i = 0; i < 3; i++) objects[i] = ssdgs_object_default(models[i]);
+    objects[0].to_world[3] = (ssdgs_real)-1.5;
+    objects[1].to_world[3] = 8;
+    together(objects, 3, &apart, &light, 1, &options, shot);
+    objects[1].model = models[3];
+    CHECK(as_new(objects, 3, &all, &light, &options) && shot->stats.lights_cached == 1);
+    for (int i = 0; i < 4; i++) ssdgs_model_destroy(models[i]);
+}
+
+/* Scattering asks lights for the depth of what they light, also where it is dark; other terms do not. Which
+   was asked for first changes nothing. */
+static void test_asked_before(void) {
+    const ssdgs_camera camera = camera_from(0.3, -3, -1);
+    ssdgs_settings s = small_settings();
+    s.light_map.size = 64;
+    s.light_map.bias = (ssdgs_real)0.001;
+    ssdgs_model *model = NULL;
+    CHECK(!ssdgs_model_create(context, &s, 200, &model));
+    stir_networks(model, 0);
+    for (int i = 0; i < 200; i++) { /* a disk, and small ones in its shadow */
+        ssdgs_gaussian g = ssdgs_gaussian_default();
+        for (int c = 0; c < 3; c++) {
+            const double at = 2 * draw(3 * (uint64_t)i + (uint64_t)c) - 1;
+            g.position[c] = (ssdgs_real)(i ? (c < 2 ? 0.4 : 0.5) * at : c < 2 ? 0 : 0.6);
+            g.scale[c] = (ssdgs_real)(i ? 0.03 : c < 2 ? 1 : 0.01);
+            g.diffuse[c] = (ssdgs_real)0.8;
+        }
+        g.opacity = (ssdgs_real)(i ? 0.95 : 0.97);
+        g.normal[0] = (ssdgs_real)0.3, g.normal[2] = 1;
+        g.softness = 1;
+        CHECK(!ssdgs_model_set(model, i, &g));
+    }
+    const ssdgs_object object = ssdgs_object_default(model);
+    ssdgs_light light = parallel_light(0, 0, 1);
+    for (int c = 0; c < 3; c++) light.intensity[c] = 1000;
+    ssdgs_render_options options[2] = {ssdgs_render_options_default(), ssdgs_render_options_default()};
+    options[0].stop = options[1].stop = (ssdgs_real)0.1;
+    options[1].terms = SSDGS_DIFFUSE_TERM | SSDGS_SHADOW_TERM;
+    together(&object, 1, &camera, &light, 1, options, shot);
+    for (int i = 1; i < 4; i++) CHECK(as_new(&object, 1, &camera, &light, options + i % 2));
+    ssdgs_model_destroy(model);
+}
+
+/* image.shadow does not depend on the objects' order: baked ones, which have none, are first or last. */
+static void test_shadow_order(void) {
+    const ssdgs_camera camera = camera_from(0, -3, 0.3);
+    const ssdgs_light light = point_light(-1, -2, 3);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    ssdgs_settings s = small_settings();
+    s.shadow.layers = 0;
+    ssdgs_model *deferred = cloud(&s, 0, 64, 0.2);
+    s.asg = SSDGS_ASG_GEOMETRIC;
+    ssdgs_model *geometric = cloud(&s, 400, 100, 0.4);
+    s.baked = 1;
+    ssdgs_model *baked = cloud(&s, 800, 10, 0.05);
+    double dark[2] = {0, 0};
+    for (int way = 0; way < 2; way++) {
+        ssdgs_object objects[3];
+        objects[way ? 0 : 2] = ssdgs_object_default(baked);
+        objects[way ? 1 : 0] = ssdgs_object_default(geometric);
+        objects[way ? 2 : 1] = ssdgs_object_default(deferred);
+        for (int i = 0; i < 3; i++)
+            objects[i].to_world[3] = (ssdgs_real)(objects[i].model == geometric ? -0.5 : 0.7);
+        objects[way ? 0 : 2].to_world[11] = (ssdgs_real)0.3;
+        together(objects, 3, &camera, &light, 1, &options, shot + way);
+        for (int i = 0; i < PIXELS; i++)
+            dark[way] += (double)(shot[way].value[15 * PIXELS + i] - shot[way].value[17 * PIXELS + i]);
+    }
+    CHECK(dark[0] > 50 && fabs(dark[1] - dark[0]) < 1e-3 * dark[0]);
+    ssdgs_model_destroy(deferred), ssdgs_model_destroy(geometric), ssdgs_model_destroy(baked);
+}
+
 /* A dark light keeps its map, and lights that come and go cost the others nothing. */
 static void test_flicker(void) {
     static const struct {
@@ -2681,6 +2799,9 @@ int main(void) {
     test_missed();
     test_anything();
     test_kept();
+    test_moved_trees();
+    test_asked_before();
+    test_shadow_order();
     test_flicker();
     TEST_ROW("94", "objects out of sight", test_out_of_sight());
     TEST_ROW("95", "lights that reach some", test_local_lights());

@@ -186,6 +186,57 @@ static void test_plate(void) {
     ssdgs_context_destroy(context);
 }
 
+/* A ball on a floor of one layer, whichever way is up: the floor is lit from the ball's side, and both have
+   their albedos, 0.3 and 0.6, but for a factor. */
+static void test_floor(void) {
+    static const double ups[5][3] = {
+        {0, 0, 1}, {0, -1, 0}, {0, 1, 0}, {-0.48, 0.6, -0.64}, {0.8, 0.36, 0.48}};
+    static const double floor_color[3] = {0.6, 0.6, 0.6};
+    ssdgs_context *context = test_context(2);
+    for (int turn = 0; turn < 5; turn++) {
+        const double *up = ups[turn];
+        ssdgs_model *model = plain_model(context, BALL + SIDE * SIDE);
+        double mean[3], off, floor_albedo = 0, side[3], across[3], length = 0;
+        int right = 0;
+        for (int c = 0; c < 3; c++) side[c] = (fabs(up[c]) < 0.5) - up[c] * 0.4, length += side[c] * up[c];
+        for (int c = 0; c < 3; c++) side[c] -= length * up[c];
+        length = sqrt(side[0] * side[0] + side[1] * side[1] + side[2] * side[2]);
+        for (int c = 0; c < 3; c++) side[c] /= length;
+        for (int c = 0; c < 3; c++)
+            across[c] = up[(c + 1) % 3] * side[(c + 2) % 3] - up[(c + 2) % 3] * side[(c + 1) % 3];
+        for (int i = 0; i < BALL; i++) {
+            const double z = 1 - (2 * i + 1.0) / BALL, r = sqrt(1 - z * z), angle = 2.39996323 * i;
+            double n[3], at[3], color[3];
+            for (int c = 0; c < 3; c++)
+                n[c] = r * cos(angle) * side[c] + r * sin(angle) * across[c] + z * up[c];
+            for (int c = 0; c < 3; c++) at[c] = 0.2 * n[c], color[c] = 0.3 * (0.5 + 0.5 * z);
+            put(model, i, at, n, 0.44 / sqrt((double)BALL), color);
+        }
+        for (int i = 0; i < SIDE * SIDE; i++) {
+            const double x = 1.4 * (i % SIDE + 0.5) / SIDE - 0.7, y = 1.4 * (i / SIDE + 0.5) / SIDE - 0.7;
+            double at[3];
+            for (int c = 0; c < 3; c++) at[c] = x * side[c] + y * across[c] - 0.21 * up[c];
+            put(model, BALL + i, at, up, 0.9 / SIDE, floor_color);
+        }
+        unbake(context, &model, NULL);
+        for (int i = BALL; i < BALL + SIDE * SIDE; i++) {
+            ssdgs_gaussian g;
+            double along = 0;
+            CHECK(!ssdgs_model_get(model, i, &g));
+            for (int c = 0; c < 3; c++) along += up[c] * (double)g.normal[c];
+            right += along > 0.9;
+            floor_albedo += (double)g.diffuse[0] / (SIDE * SIDE);
+        }
+        albedos(model, 0, mean, &off);
+        printf("figure unbake_floor_%d %.3f %.3f\n", turn, floor_albedo, mean[0]);
+        CHECK(right > 0.98 * SIDE * SIDE);
+        CHECK(floor_albedo > 0.5 && floor_albedo < 0.91);
+        CHECK(mean[0] > 0.3 * floor_albedo && mean[0] < 0.65 * floor_albedo);
+        ssdgs_model_destroy(model);
+    }
+    ssdgs_context_destroy(context);
+}
+
 /* A ball of two colours: they do not run into each other. The white of what is not told is 0.9. */
 static void test_hues(void) {
     static const double hue[2][3] = {{0.3, 0.02, 0.02}, {0.02, 0.02, 0.3}};
@@ -499,6 +550,7 @@ int main(void) {
     test_room();
     test_told();
     test_plate();
+    test_floor();
     test_lit();
     test_hues();
     test_bottom();
