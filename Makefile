@@ -39,9 +39,10 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 	$(BUILD)/train examples/data/waxcow -o $(DEMO)/waxcow.ply --iterations $(ITERATIONS) --background black
 	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
 	  --out $(DEMO) --sheet $(DEMO)/sheet.png
+	@echo "$(DEMO)/sheet.png: photographs, the model's renderings, and what these consist of. make view MODEL=$(DEMO)/waxcow.ply"
 
-view: $(BUILD)/view ## a trained model in the browser: prints the address to open
-	$(BUILD)/view examples/data/waxcow.ply
+view: $(BUILD)/view ## a model in the browser (MODEL=file.ply): prints the address to open
+	$(BUILD)/view $(MODEL)
 
 web: $(BUILD)/web.wasm $(MODEL) ## one page that needs no server: build/view.html (MODEL=file.ply); needs emscripten
 	{ echo '<script type="text/plain" id="code">'; base64 <$(BUILD)/web.wasm; echo '</script>'; \

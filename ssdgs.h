@@ -77,7 +77,8 @@ CONVENTIONS
           intensity. Give intensities in the unit used for the photographs: training sets light_scale so that
           the geometric mean of E at the centre of the bounds is 1.
   colour  renders are linear light, never encoded or clamped, multiplied by alpha ("premultiplied").
-          ssdgs_to_pixels(), ssdgs_blend_pixels() and ssdgs_to_bytes() encode them. Photographs,
+          ssdgs_to_pixels(), ssdgs_blend_pixels() and ssdgs_to_bytes() encode them. Plain splats alone
+          are blended as stored values, for SSDGS_TRANSFER_NONE: SCENES. Photographs,
           options.background and ssdgs_evaluate() use stored values; settings.transfer relates these to linear
           ones. A photograph's alpha blends stored values, as ssdgs_compose() does.
   images  row-major, top row first, up to 32768 px a side.
@@ -138,6 +139,8 @@ SCENES, as engines have them: examples/engine.c is one
   light's map covers all objects of the array: leave out what is far away.
   All objects share the largest one's shadow bias: a very large model removes contact shadows of small ones.
   If models have different settings.light_scale, set object.tint to compensate.
+  Plain splats are blended as they were made, as stored values, while a frame has nothing else: then give
+  SSDGS_TRANSFER_NONE to ssdgs_blend_pixels(). Beside any other model they are linear light, as all else.
   Baked colours are the light of a capture. examples/unbake.h makes models of them that take light, and may
   keep a share of them. light.kept says how much of them its shadow takes away. That is for shadows of what
   the capture did not have: its own, which it shows already, become twice as dark.
@@ -503,7 +506,7 @@ typedef struct ssdgs_light {
 } ssdgs_light;
 
 /* Lights of each kind; what else they have, set behind that. direction: of any length. cone: angles inner and
-   outer. NULL: zeros, which rendering refuses. */
+   outer. NULL: zeros; rendering refuses a direction of zeros. */
 SSDGS_API ssdgs_light ssdgs_light_point(const ssdgs_real position[3], const ssdgs_real intensity[3]);
 SSDGS_API ssdgs_light ssdgs_light_directional(const ssdgs_real direction[3], const ssdgs_real irradiance[3]);
 SSDGS_API ssdgs_light ssdgs_light_spot(const ssdgs_real position[3], const ssdgs_real direction[3],
@@ -3553,8 +3556,9 @@ static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_came
                       !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
                       !ssdgs__finite(c->near_plane),
                   "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
-                  "lengths must be positive, near_plane not negative, all finite",
-                  (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane);
+                  "lengths must be positive, near_plane not negative, all finite%s",
+                  (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane,
+                  c->fx > 0 || c->fx < 0 ? "" : "; is eye target, or the field of view in degrees?");
     for (int i = 0; i < 12; i++)
         if (!ssdgs__finite(c->view[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);

@@ -17,6 +17,9 @@
 
 #ifndef ADOPT_H
 #define ADOPT_H
+#ifndef SSDGS_STAGES
+#error adopt.h needs SSDGS_STAGES to be defined before ssdgs.h is included
+#endif
 
 #include <math.h>
 #include <stdlib.h>

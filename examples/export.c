@@ -589,7 +589,8 @@ int main(int argc, char **argv) {
     if (e.model) e.count = ssdgs_model_peek(e.model).count;
     if (!failed && !result && (e.count < 1 || ssdgs_model_settings(e.model)->baked))
         failed = olat__fail(error, "%s: %s", names[0],
-                            e.count < 1 ? "has no Gaussians" : "is no relightable model");
+                            e.count < 1 ? "has no Gaussians"
+                                        : "is a plain splat: build/unbake makes a model of it");
     if (!failed && !result) {
         e.splats = (splat *)calloc((size_t)e.count, sizeof *e.splats);
         e.normals = (float *)calloc((size_t)e.count, 3 * sizeof *e.normals);
@@ -599,8 +600,9 @@ int main(int argc, char **argv) {
     }
     if (!failed && !result) result = look(&e, lit ? from : NULL, error);
     if (!failed && !result && !*error) result = work(&e, names[1], error);
-    if (*error) fprintf(stderr, "%s\n", error);
-    else if (result) fprintf(stderr, "%s: %s\n", ssdgs_result_string(result), ssdgs_error_message(e.context));
+    if (*error) fprintf(stderr, "export: %s\n", error);
+    else if (result)
+        fprintf(stderr, "export: %s: %s\n", ssdgs_result_string(result), ssdgs_error_message(e.context));
     ssdgs_model_destroy(e.model);
     ssdgs_context_destroy(e.context);
     free(e.splats), free(e.normals), free(e.sums), free(e.bytes);

@@ -324,7 +324,7 @@ static int olat__guard_add(olat_guard *guard, const char *path, const uint64_t *
     return olat__fail(error,
                       slot->is_output
                           ? "%s: would be written twice, also as %s: give the outputs different names"
-                          : "%s: would replace an input, %s: choose another output folder",
+                          : "%s: would replace an input, %s: choose another output",
                       olat__tail(path), olat__tail(slot->path));
 }
 
@@ -343,8 +343,8 @@ OLAT__API int olat_guard_output(olat_guard *guard, const char *path, char error[
     file.name = "";
     const olat__known *input;
     if (guard->room && olat__identify(path, file.id) && (input = olat__slot(guard, &file))->path) {
-        return olat__fail(error, "%s: would replace an input, %s: choose another output folder",
-                          olat__tail(path), olat__tail(input->path));
+        return olat__fail(error, "%s: would replace an input, %s: choose another output", olat__tail(path),
+                          olat__tail(input->path));
     }
     return olat__guard_add(guard, path, NULL, 1, error);
 }

@@ -12,8 +12,8 @@
    or tiles, unpacked, RLE, ZIPS, ZIP, PIZ or PXR24, halves or floats: the display window, alpha divided out,
    in sRGB's primaries; R G B A of the layer or part named Combined, else of the one without a name, else of
    rgba or beauty, of one with alpha, of any; where there is none, Y; of the default view. JPEG as jpeg.h has
-   it, sRGB or by its ICC profile. olat__image_file does all that and tells what is to be noted; olat_read_png
-   gives a PNG's numbers as they are stored.
+   it, by its ICC profile, EXIF's Adobe RGB, or sRGB. olat__image_file does all that and tells what is to be
+   noted; olat_read_png gives a PNG's numbers as they are stored.
 
    CONTENTS  inflate and deflate; what is to be noted of files; primaries; PNG; OpenEXR; what numbers stand
    for, curves and profiles, each kind of file as a photograph or a mask.
@@ -2039,18 +2039,32 @@ static int olat__convert(const olat__space *space, olat__image *image, olat__fou
     return 0;
 }
 
-/* The orientation that an eXIf chunk tells, 1 if none. */
-static int olat__exif_orientation(const unsigned char *p, size_t size) {
-    if (size < 8 || (memcmp(p, "II*\0", 4) != 0 && memcmp(p, "MM\0*", 4) != 0)) return 1;
+/* EXIF is a TIFF: a number of its, where a directory's entry has its value, 0 if it is not there. */
+static uint32_t olat__exif_long(const unsigned char *p, size_t at) {
+    return p[0] == 'I' ? olat__le32(p + at) : olat__be32(p + at);
+}
+static size_t olat__exif_entry(const unsigned char *p, size_t size, uint32_t directory, int tag) {
     const int high = p[0] == 'I', low = !high; /* where a word has which byte */
-    const uint32_t big = olat__be32(p + 4), at = high ? olat__le32(p + 4) : big;
-    if (at > size - 2) return 1;
-    const int count = p[at + (uint32_t)low] | p[at + (uint32_t)high] << 8;
-    for (size_t i = 0; i < (size_t)count && i < (size - 2 - at) / 12; i++) {
-        const unsigned char *entry = p + at + 2 + 12 * i;
-        if ((entry[low] | entry[high] << 8) == 0x112) return entry[8 + low] | entry[8 + high] << 8;
+    if (directory > size - 2) return 0;
+    const int count = p[directory + (uint32_t)low] | p[directory + (uint32_t)high] << 8;
+    for (size_t i = 0; i < (size_t)count && i < (size - 2 - directory) / 12; i++) {
+        const size_t at = directory + 2 + 12 * i;
+        if ((p[at + (size_t)low] | p[at + (size_t)high] << 8) == tag) return at + 8;
     }
-    return 1;
+    return 0;
+}
+
+/* What EXIF tells: an orientation, 1 if none, and whether the pixels are of Adobe RGB, as cameras say it that
+   add no profile: by the interoperability index of DCF's option file. */
+static void olat__exif_told(const unsigned char *p, size_t size, int *orientation, int *is_adobe) {
+    *orientation = 1, *is_adobe = 0;
+    if (!p || size < 8 || (memcmp(p, "II*\0", 4) != 0 && memcmp(p, "MM\0*", 4) != 0)) return;
+    size_t at = olat__exif_entry(p, size, olat__exif_long(p, 4), 0x112);
+    if (at) *orientation = p[at + (p[0] != 'I')] | p[at + (p[0] == 'I')] << 8;
+    at = olat__exif_entry(p, size, olat__exif_long(p, 4), 0x8769);
+    if (at) at = olat__exif_entry(p, size, olat__exif_long(p, at), 0xA005);
+    if (at) at = olat__exif_entry(p, size, olat__exif_long(p, at), 1);
+    *is_adobe = at && !memcmp(p + at, "R03", 4);
 }
 
 /* Makes pixels of that space those of a photograph. */
@@ -2076,8 +2090,7 @@ static int olat__to_photo(const char *name, const olat__space *space, olat__imag
     return olat__convert(space, image, found) && olat__fail(error, "%s: out of memory", olat__tail(name));
 }
 
-static void olat__tell_turned(olat__found *found, const char *who, const unsigned char *exif, size_t size) {
-    const int turned = exif ? olat__exif_orientation(exif, size) : 1;
+static void olat__tell_turned(olat__found *found, const char *who, int turned) {
     if (turned > 1 && turned < 9) olat__tell(found, OLAT__NAMED, OLAT__TURNED, who, turned);
 }
 
@@ -2100,7 +2113,9 @@ static int olat__png_file(const char *name, const unsigned char *bytes, size_t s
     failed = olat__png_space(name, &png, &space, found, error) ||
              olat__to_photo(name, &space, image, found, error);
     free(png.packed);
-    olat__tell_turned(found, "eXIf orientation", png.told[OLAT__EXIF].data, png.told[OLAT__EXIF].size);
+    int turned, is_adobe; /* PNG has chunks for that */
+    olat__exif_told(png.told[OLAT__EXIF].data, png.told[OLAT__EXIF].size, &turned, &is_adobe);
+    olat__tell_turned(found, "eXIf orientation", turned);
     const unsigned char *phys = png.told[OLAT__PHYS].data;
     if (phys) {
         const double x = olat__be32(phys), y = olat__be32(phys + 4);
@@ -2138,15 +2153,23 @@ static int olat__jpeg_file(const char *name, const unsigned char *bytes, size_t 
     image->format = SSDGS_PIXELS_RGBA8;
     image->pixels = j.out;
     if (failed || is_mask) return failed;
+    int turned, is_adobe;
+    olat__exif_told(j.exif.data, j.exif.size, &turned, &is_adobe);
     olat__srgb_space(&space);
     const char *problem = j.profile_parts || j.profile_damaged ? olat__jpeg_space(&j, &joined, &space) : NULL;
     if (problem && !strcmp(problem, "out of memory"))
         failed = olat__fail(error, "%s: out of memory", olat__tail(name));
     else if (problem)
         olat__srgb_space(&space), olat__tell(found, OLAT__NAMED, OLAT__UNUSABLE, "an ICC profile", problem);
+    else if (is_adobe && !j.profile_parts) {
+        static const double xy[8] = {0.64, 0.33, 0.21, 0.71, 0.15, 0.06, 0.3127, 0.329};
+        for (int c = 0; c < 3; c++) olat__power(space.code + c, 563.0 / 256, 1, 0, 0, 0);
+        space.differs = olat__primaries(xy, space.matrix) == 2;
+        snprintf(space.source, sizeof space.source, "EXIF's Adobe RGB");
+    }
     if (!failed) failed = olat__to_photo(name, &space, image, found, error);
     free(joined);
-    olat__tell_turned(found, "EXIF's orientation", j.exif.data, j.exif.size);
+    olat__tell_turned(found, "EXIF's orientation", turned);
     if (j.density[0] && j.density[1] && fabs((double)j.density[0] / j.density[1] - 1) > 0.01)
         olat__tell(found, OLAT__NAMED, OLAT__OBLONG("JFIF density %d x %d"), j.density[0], j.density[1]);
     if (j.padded) olat__tell(found, OLAT__NAMED, "padded where no padding belongs: it may be damaged");

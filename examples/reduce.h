@@ -16,6 +16,9 @@
 
 #ifndef REDUCE_H
 #define REDUCE_H
+#ifndef SSDGS_STAGES
+#error reduce.h needs SSDGS_STAGES to be defined before ssdgs.h is included
+#endif
 
 #include <math.h>
 #include <stdlib.h>

@@ -81,7 +81,7 @@ static const char *const help[] = {
     "  --downscale N            photographs, masks and cameras N times smaller: means of N x N pixels' light",
     "  --keep-best              holds every tenth photograph out and keeps the model that scores best on",
     "                           those, in MODEL.ply.best until the run ends",
-    "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, as Ctrl-C and the end do; never",
+    "  --checkpoint-every N     writes MODEL.ply.ckpt every N iterations, not only at the end and at Ctrl-C",
     "  --view                   shows the model as it trains in the browser: prints the address to open",
     "  --resume                 goes on from MODEL.ply.ckpt, bit for bit; give the other options again. Only",
     "                           --iterations, --max-gaussians and rates may be others: longer, say",

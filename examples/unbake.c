@@ -14,9 +14,9 @@ static void hear(void *user, ssdgs_result code, const char *message) {
     if (!strstr(message, "lights change nothing")) olat_hear(user, code, message);
 }
 
-static int usage(void) {
+static int usage(FILE *to) {
     fprintf(
-        stderr,
+        to,
         "usage: unbake PLAIN -o LIT.ply [--ambient R,G,B] [--eye X,Y,Z ...] [--keep K]\n"
         "              [--medium S,A] [--roughness R] [--f0 F]\n"
         "  PLAIN            PLY, compressed PLY, or SPZ up to version 3\n"
@@ -27,7 +27,7 @@ static int usage(void) {
         "  --medium S,A     it is of wax or skin: reduced scattering and absorption of one world unit\n"
         "  --roughness R    it has highlights, of Beckmann's roughness 0.01 .. 1\n"
         "  --f0 F           with --roughness: what they reflect from the front, above 0, up to 1; 0.04\n");
-    return 2;
+    return to == stderr ? 2 : 0;
 }
 
 /* Numbers with commas between them, all finite and at least so much. */
@@ -60,6 +60,7 @@ int main(int argc, char **argv) {
         const char *value = i + 1 < argc ? argv[i + 1] : "";
         ssdgs_real medium[2];
         int known = 1;
+        if (!strcmp(argv[i], "--help")) return usage(stdout);
         if (!strcmp(argv[i], "-o") && i + 1 < argc) to = value;
         else if (!strcmp(argv[i], "--ambient")) known = numbers(value, 3, 0, options.ambient[0]);
         else if (!strcmp(argv[i], "--keep")) known = numbers(value, 1, 0, &options.kept);
@@ -75,10 +76,16 @@ int main(int argc, char **argv) {
             from = argv[i];
             continue;
         } else known = 0;
-        if (!known) return usage();
+        if (!known) {
+            fprintf(stderr, "unbake: what is %s%s%s?\n", argv[i], *value ? " " : "", value);
+            return usage(stderr);
+        }
         i++;
     }
-    if (!from || !to) return usage();
+    if (!from || !to) {
+        fprintf(stderr, "unbake: needs PLAIN and -o LIT.ply\n");
+        return usage(stderr);
+    }
     options.eyes = (const ssdgs_real(*)[3])eyes;
     memset(&guard, 0, sizeof guard);
     int failed = olat_guard_input(&guard, from, error) || olat_guard_output(&guard, to, error);

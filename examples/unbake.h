@@ -18,6 +18,9 @@
 
 #ifndef UNBAKE_H
 #define UNBAKE_H
+#ifndef SSDGS_STAGES
+#error unbake.h needs SSDGS_STAGES to be defined before ssdgs.h is included
+#endif
 
 #include <math.h>
 #include <stdio.h>

@@ -32,9 +32,13 @@ static void tell_of(const char *name, const ssdgs_model *model, const ssdgs_load
             read->untrained ? ", without the settings and networks that an editor has dropped" : "");
 }
 
-static int usage(void) {
-    fprintf(stderr, "usage: view MODEL.ply [MODEL.ply ...] [--port N] [--page view.html] [--gpu]\n");
-    return 2;
+static int usage(FILE *to) {
+    fprintf(to, "usage: view MODEL [MODEL ...] [--port N] [--page view.html] [--gpu]\n"
+                "  MODEL        trained, or plain splats: PLY, compressed PLY, or SPZ up to version 3\n"
+                "  --port N     where the page is served, on this machine alone; any that is free\n"
+                "  --page FILE  the page; the view.html beside view.c\n"
+                "  --gpu        the GPU draws, by OpenGL 4.3; else the CPU does\n");
+    return to == stderr ? 2 : 0;
 }
 
 int main(int argc, char **argv) {
@@ -43,15 +47,16 @@ int main(int argc, char **argv) {
     int failed = 0, wants_gpu = 0;
     for (int i = 1; i < argc; i++) {
         char *rest = NULL;
+        if (!strcmp(argv[i], "--help")) return usage(stdout);
         if (!strcmp(argv[i], "--port") && i + 1 < argc) {
             s.port = (int)strtol(argv[++i], &rest, 10);
-            if (*rest || s.port < 1 || s.port > 65535) return usage();
+            if (*rest || s.port < 1 || s.port > 65535) return usage(stderr);
         } else if (!strcmp(argv[i], "--page") && i + 1 < argc) snprintf(page, sizeof page, "%s", argv[++i]);
         else if (!strcmp(argv[i], "--gpu")) wants_gpu = 1;
         else if (argv[i][0] != '-' && s.show.count < VIEW__MODELS) s.show.names[s.show.count++] = argv[i];
-        else return usage();
+        else return usage(stderr);
     }
-    if (!s.show.count) return usage();
+    if (!s.show.count) return usage(stderr);
     ssdgs_context_desc desc;
     memset(&desc, 0, sizeof desc);
     desc.tracer.stage = view_stage;

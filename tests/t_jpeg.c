@@ -385,6 +385,57 @@ static void test_told(void) {
     CHECK(still(0, NULL));
 }
 
+/* EXIF as cameras write it: the interoperability index, two directories deep. R03 is Adobe RGB, whose matrix
+   to sRGB is that of its primaries (Adobe RGB (1998), 4.3.4); a profile goes before it. */
+static void test_adobe_rgb(void) {
+    static const double adobe[9] = {1.3983557, -0.3983557, 0, 0, 1, 0, 0, -0.0429290, 1.0429290};
+    static const struct {
+        char index[4];
+        int big, cut, says;
+    } cases[] = {{"R03", 0, 0, 1}, {"R03", 1, 0, 1}, {"R98", 0, 0, 0}, {"R03", 0, 5, 0}, {"R03", 1, 30, 0}};
+    static const unsigned tags[3] = {0x8769, 0xA005, 1};
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        unsigned char exif[4 + 6 + 8 + 3 * 18] = {255, 0xE1, 0, 0, 'E', 'x', 'i', 'f'}, *tiff = exif + 10;
+        const int big = cases[k].big;
+        const size_t size = sizeof exif - (size_t)cases[k].cut;
+        double worst = 0;
+        exif[3] = (unsigned char)(size - 2);
+        memcpy(tiff, big ? "MM\0*\0\0\0\x08" : "II*\0\x08\0\0\0", 8);
+        for (int i = 0; i < 3; i++) { /* a directory of one entry */
+            const unsigned words[3] = {1, tags[i], i < 2 ? 4 : 2};
+            unsigned char *at = tiff + 8 + 18 * i;
+            for (int w = 0; w < 3; w++)
+                at[2 * w + big] = words[w] & 255, at[2 * w + !big] = words[w] >> 8 & 255;
+            at[big ? 9 : 6] = i < 2 ? 1 : 4;
+            at[big ? 13 : 10] = (unsigned char)(8 + 18 * (i + 1));
+            if (i == 2) memcpy(at + 10, cases[k].index, 4);
+        }
+        read_seed(names[0]);
+        insert(2, exif, size);
+        if (!CHECK(reads(0))) continue;
+        CHECK(cases[k].says
+                  ? image.format == SSDGS_PIXELS_RGBA16 && found.count >= 1 &&
+                        strstr(found.remarks[0].text, "not sRGB (EXIF's Adobe RGB): converted to sRGB")
+                  : is_golden(0) && !found.count);
+        for (int i = 0; i < golden_width[0] * golden_height[0] && cases[k].says; i++) {
+            const uint16_t *got = (const uint16_t *)image.pixels + 4 * i;
+            for (int c = 0; c < 3; c++) {
+                double light = 0;
+                for (int j = 0; j < 3; j++)
+                    light += adobe[3 * c + j] * pow(golden[0][3 * i + j] / 255.0, 563.0 / 256);
+                light = light < 0 ? 0 : light > 1 ? 1 : light;
+                worst = test_most(worst, fabs(to_light(got[c] / 65535.0) - light));
+            }
+        }
+        CHECK(worst < 2e-4);
+        forget();
+        read_seed("p3_turned");
+        insert(2, exif, size);
+        CHECK(reads(0) && strstr(found.remarks[0].text, "not sRGB (ICC profile)"));
+        forget();
+    }
+}
+
 /* ---- datasets ---- */
 
 static olat_dataset set;
@@ -478,6 +529,7 @@ int main(void) {
     test_damage();
     test_memory();
     test_told();
+    test_adobe_rgb();
     test_datasets();
     TEST_END();
 }
