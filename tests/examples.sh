@@ -347,7 +347,7 @@ check "--linear" says 2 "^usage: export" export_of "$model" "$out/linear" --line
 cp "$model" "$out/own.ply"
 check "over the model" says 1 "would replace an input" export_of "$out/own.ply" "$out/own"
 check "a model that is not there" says 1 "nothing.ply" export_of "$out/nothing.ply" "$out/none"
-check "a plain splat" says 1 "is no relightable model" export_of "$out/exported.ply" "$out/none"
+check "a plain splat" says 1 "is a plain splat: build/unbake" export_of "$out/exported.ply" "$out/none"
 check "a folder that is not there" says 1 "never" export_of "$model" "$out/never/x"
 check "no names" says 2 "^usage: export" export_of
 check "nothing was written" test ! -e "$out/none.glb"
