@@ -6,6 +6,7 @@
    int width, height; ssdgs_pixels format; void *pixels; char error[512];
    if (olat_read_png("in.png", &width, &height, &format, &pixels, error)) { puts(error); return 1; }
    ... (height, width, 4) bytes or words as stored ...  free(pixels);
+   if (olat_write_png("out.png", width, height, 4, bytes, error)) { puts(error); return 1; }
 
    READS  PNG of any kind, as bytes or words of sRGB: what cICP, else an ICC profile of curves and a matrix,
    else sRGB, else gAMA and cHRM say is converted to that, PQ and HLG to light in halves. OpenEXR, scan lines
