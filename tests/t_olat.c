@@ -3395,8 +3395,7 @@ static const char *output(const char *path) {
 
 static int replaces(const char *path, const char *input) {
     char wanted[600];
-    snprintf(wanted, sizeof wanted, "%s: would replace an input, %s: choose another output", path,
-             input);
+    snprintf(wanted, sizeof wanted, "%s: would replace an input, %s: choose another output", path, input);
     if (!strcmp(output(path), wanted)) return 1;
     printf("%s: wanted \"%s\", got \"%s\"\n", path, wanted, error);
     return 0;
