@@ -17,7 +17,7 @@
 
 #ifndef ADOPT_H
 #define ADOPT_H
-#ifndef SSDGS_STAGES
+#if !defined(SSDGS_STAGES) && !defined(SSDGS_IMPLEMENTATION)
 #error adopt.h needs SSDGS_STAGES to be defined before ssdgs.h is included
 #endif
 

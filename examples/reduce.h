@@ -16,7 +16,7 @@
 
 #ifndef REDUCE_H
 #define REDUCE_H
-#ifndef SSDGS_STAGES
+#if !defined(SSDGS_STAGES) && !defined(SSDGS_IMPLEMENTATION)
 #error reduce.h needs SSDGS_STAGES to be defined before ssdgs.h is included
 #endif
 

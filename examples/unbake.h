@@ -18,7 +18,7 @@
 
 #ifndef UNBAKE_H
 #define UNBAKE_H
-#ifndef SSDGS_STAGES
+#if !defined(SSDGS_STAGES) && !defined(SSDGS_IMPLEMENTATION)
 #error unbake.h needs SSDGS_STAGES to be defined before ssdgs.h is included
 #endif
 
