@@ -402,7 +402,7 @@ static void test_adobe_rgb(void) {
         exif[3] = (unsigned char)(size - 2);
         memcpy(tiff, big ? "MM\0*\0\0\0\x08" : "II*\0\x08\0\0\0", 8);
         for (int i = 0; i < 3; i++) { /* a directory of one entry */
-            const unsigned words[3] = {1, tags[i], i < 2 ? 4 : 2};
+            const unsigned words[3] = {1, tags[i], i < 2 ? 4u : 2u};
             unsigned char *at = tiff + 8 + 18 * i;
             for (int w = 0; w < 3; w++)
                 at[2 * w + big] = words[w] & 255, at[2 * w + !big] = words[w] >> 8 & 255;
