@@ -189,11 +189,13 @@ static void test_plate(void) {
 /* A ball on a floor of one layer, whichever way is up: the floor is lit from the ball's side, and both have
    their albedos, 0.3 and 0.6, but for a factor. */
 static void test_floor(void) {
-    static const double ups[5][3] = {
-        {0, 0, 1}, {0, -1, 0}, {0, 1, 0}, {-0.48, 0.6, -0.64}, {0.8, 0.36, 0.48}};
+    static const double ups[6][3] = {
+        {0, 0, 1},         {0, -1, 0},
+        {0, 1, 0},         {-0.48, 0.6, -0.64},
+        {0.8, 0.36, 0.48}, {0.1056, 0.191, -0.9759}}; /* as far as can be from those of the sky */
     static const double floor_color[3] = {0.6, 0.6, 0.6};
     ssdgs_context *context = test_context(2);
-    for (int turn = 0; turn < 5; turn++) {
+    for (int turn = 0; turn < 6; turn++) {
         const double *up = ups[turn];
         ssdgs_model *model = plain_model(context, BALL + SIDE * SIDE);
         double mean[3], off, floor_albedo = 0, side[3], across[3], length = 0;
@@ -234,6 +236,35 @@ static void test_floor(void) {
         CHECK(mean[0] > 0.3 * floor_albedo && mean[0] < 0.65 * floor_albedo);
         ssdgs_model_destroy(model);
     }
+    ssdgs_context_destroy(context);
+}
+
+/* A floor with a thin pole on it and a ball under it: it looks flatter from the pole's side, but most of what
+   there is stands there, so that side is up. */
+static void test_pole(void) {
+    static const double up[3] = {0, 0, 1}, grey[3] = {0.3, 0.3, 0.3};
+    ssdgs_context *context = test_context(2);
+    ssdgs_model *model = plain_model(context, BALL + SIDE * SIDE);
+    int right = 0;
+    for (int i = 0; i < BALL; i++) {
+        const double share = (i / 2 + 0.5) / (BALL / 2), angle = 2.39996323 * i, z = 1 - 2 * share;
+        const double r = i % 2 ? sqrt(1 - z * z) : 1, n[3] = {r * cos(angle), r * sin(angle), i % 2 ? z : 0};
+        const double size = i % 2 ? 0.2 : 0.06,
+                     at[3] = {size * n[0], size * n[1], i % 2 ? -0.5 + 0.2 * z : 2.2 * share};
+        put(model, i, at, n, i % 2 ? 0.016 : 0.021, grey);
+    }
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        const double at[3] = {1.4 * (i % SIDE + 0.5) / SIDE - 0.7, 1.4 * (i / SIDE + 0.5) / SIDE - 0.7, 0};
+        put(model, BALL + i, at, up, 0.9 / SIDE, grey);
+    }
+    unbake(context, &model, NULL);
+    for (int i = BALL; i < BALL + SIDE * SIDE; i++) {
+        ssdgs_gaussian g;
+        CHECK(!ssdgs_model_get(model, i, &g));
+        right += g.normal[2] > (ssdgs_real)0.9;
+    }
+    CHECK(right > 0.95 * SIDE * SIDE);
+    ssdgs_model_destroy(model);
     ssdgs_context_destroy(context);
 }
 
@@ -551,6 +582,7 @@ int main(void) {
     test_told();
     test_plate();
     test_floor();
+    test_pole();
     test_lit();
     test_hues();
     test_bottom();
