@@ -2040,7 +2040,7 @@ static int olat__convert(const olat__space *space, olat__image *image, olat__fou
     return 0;
 }
 
-/* EXIF is a TIFF: a number of its, where a directory's entry has its value, 0 if it is not there. */
+/* EXIF is a TIFF. A number in it; and where an entry of a directory has its value, 0 if there is none. */
 static uint32_t olat__exif_long(const unsigned char *p, size_t at) {
     return p[0] == 'I' ? olat__le32(p + at) : olat__be32(p + at);
 }

@@ -225,10 +225,10 @@ static inline double unbake__plane(const unbake__state *u, int k, double plane[3
         }
     }
     for (int j = 0; j <= UNBAKE__LAYERS - UNBAKE__THICK; j++) {
-        double sum_of = 0;
-        for (int t = 0; t < UNBAKE__THICK; t++) sum_of += layer[j + t];
-        if (sum_of > within)
-            within = sum_of, *middle = u->size * ((2.0 * j + UNBAKE__THICK) / UNBAKE__LAYERS - 1);
+        double together = 0;
+        for (int t = 0; t < UNBAKE__THICK; t++) together += layer[j + t];
+        if (together > within)
+            within = together, *middle = u->size * ((2.0 * j + UNBAKE__THICK) / UNBAKE__LAYERS - 1);
     }
     return within / all;
 }
