@@ -39,7 +39,7 @@ demo: $(BUILD)/train $(BUILD)/relight ## trains on examples/data/waxcow (ITERATI
 	$(BUILD)/train examples/data/waxcow -o $(DEMO)/waxcow.ply --iterations $(ITERATIONS) --background black
 	$(BUILD)/relight $(DEMO)/waxcow.ply examples/data/waxcow --split test --background black --components \
 	  --out $(DEMO) --sheet $(DEMO)/sheet.png
-	@echo "$(DEMO)/sheet.png: photographs, the model's renderings, and what these consist of. make view MODEL=$(DEMO)/waxcow.ply"
+	@echo "look at $(DEMO)/sheet.png: photographs, the model's pictures of them, and their parts; then make view MODEL=$(DEMO)/waxcow.ply"
 
 view: $(BUILD)/view ## a model in the browser (MODEL=file.ply): prints the address to open
 	$(BUILD)/view $(MODEL)
