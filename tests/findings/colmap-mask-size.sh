@@ -8,11 +8,9 @@
 debian colmap colmap 3.8
 python3 - <<'END'
 import os, sqlite3, struct, subprocess, sys, zlib
+from files import picture
 def png(path, w, h, value): # 8-bit grey
-    chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
-    rows = b''.join(b'\0' + bytes(value(x, y) for x in range(w)) for y in range(h))
-    open(path, 'wb').write(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', w, h, 8, 0, 0, 0, 0)) +
-        chunk(b'IDAT', zlib.compress(rows)) + chunk(b'IEND', b''))
+    picture(path, w, h, 8, 0, bytes(value(x, y) for y in range(h) for x in range(w)))
 W, H = 400, 300
 os.mkdir('photos'); os.mkdir('masks')
 png('photos/a.png', W, H, lambda x, y: zlib.crc32(b'%d %d' % (x // 4, y // 4)) & 255) # blocks of noise

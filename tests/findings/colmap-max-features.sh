@@ -5,7 +5,8 @@
 . "$(dirname "$0")/lib.sh"
 debian colmap colmap 3.8
 python3 - <<'END'
-import math, os, random, sqlite3, struct, subprocess, sys, zlib
+import math, os, random, sqlite3, subprocess, sys
+from files import picture
 W, H = 640, 480
 draw, light = random.Random(1), [128.] * (W * H)
 for blob in range(1500): # of six sizes
@@ -14,9 +15,7 @@ for blob in range(1500): # of six sizes
         for x in range(max(0, x0 - 3 * r), min(W, x0 + 3 * r)):
             light[y * W + x] += high * math.exp(-((x - x0) ** 2 + (y - y0) ** 2) / (2 * r * r))
 os.mkdir('photos')
-chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
-rows = b''.join(b'\0' + bytes(max(0, min(255, int(v))) for v in light[y * W:(y + 1) * W]) for y in range(H))
-open('photos/blobs.png', 'wb').write(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', W, H, 8, 0, 0, 0, 0)) + chunk(b'IDAT', zlib.compress(rows)) + chunk(b'IEND', b''))
+picture('photos/blobs.png', W, H, 8, 0, bytes(max(0, min(255, int(v))) for v in light))
 def features(name, *options):
     subprocess.run(['colmap', 'feature_extractor', '--database_path', name, '--image_path', 'photos', '--SiftExtraction.use_gpu', '0', *options], check=True,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=dict(os.environ, QT_QPA_PLATFORM='offscreen'))

@@ -7,13 +7,10 @@
 debian colmap colmap 3.8
 python3 - <<'END'
 import os, struct, subprocess, sys, zlib
-from files import chunks, colour
+from files import chunks, colour, picture
 W, H = 64, 48
 def wall(path): # 16-bit grey of 0.25, linear
-    chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
-    rows = (b'\0' + struct.pack('>H', 16384) * 3 * W) * H
-    open(path, 'wb').write(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', W, H, 16, 2, 0, 0, 0)) + chunk(b'gAMA', struct.pack('>I', 100000)) +
-        chunk(b'IDAT', zlib.compress(rows)) + chunk(b'IEND', b''))
+    picture(path, W, H, 16, 2, struct.pack('>H', 16384) * 3 * W * H, (b'gAMA', struct.pack('>I', 100000)))
 for folder in ('photos', 'model'): os.mkdir(folder)
 for name in ('straight', 'bent'): wall('photos/%s.png' % name)
 open('model/cameras.txt', 'w').write('1 PINHOLE 64 48 80 80 32 24\n2 SIMPLE_RADIAL 64 48 80 32 24 0.01\n')

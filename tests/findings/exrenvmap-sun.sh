@@ -7,18 +7,10 @@
 debian exrenvmap openexr 3.1.5
 need oiiotool openimageio-tools
 python3 - <<'END'
-import re, struct, subprocess, sys
-W, H = 64, 32
-def sky(path, sun): # float R G B: 1, and one pixel of the sun
-    channels = b''.join(c + b'\0' + struct.pack('<iB3xii', 2, 0, 1, 1) for c in (b'B', b'G', b'R')) + b'\0'
-    box, one = struct.pack('<4i', 0, 0, W - 1, H - 1), struct.pack('<f', 1)
-    attributes = [(b'channels', b'chlist', channels), (b'compression', b'compression', b'\0'), (b'dataWindow', b'box2i', box),
-        (b'displayWindow', b'box2i', box), (b'lineOrder', b'lineOrder', b'\0'), (b'pixelAspectRatio', b'float', one),
-        (b'screenWindowCenter', b'v2f', bytes(8)), (b'screenWindowWidth', b'float', one)]
-    head = b'\x76\x2f\x31\x01\2\0\0\0' + b''.join(n + b'\0' + k + b'\0' + struct.pack('<i', len(d)) + d for n, k, d in attributes) + b'\0'
-    lines = [struct.pack('<ii', y, 12 * W) + 3 * b''.join(struct.pack('<f', sun if (x, y) == (20, 8) else 1) for x in range(W)) for y in range(H)]
-    table = b''.join(struct.pack('<Q', len(head) + 8 * H + y * len(lines[0])) for y in range(H))
-    open(path, 'wb').write(head + table + b''.join(lines))
+import re, subprocess, sys
+from files import exr
+def sky(path, sun): # 1, and one pixel of the sun
+    exr(path, [(c, 2, lambda x, y: sun if (x, y) == (20, 8) else 1) for c in 'BGR'], w=64, h=32)
 seen = {}
 for sun in (60000, 100000):
     sky('sky.exr', sun)

@@ -1,9 +1,13 @@
-# PNG and OpenEXR: the writers, of one pixel each, and readers of what the files say of it
+# PNG and OpenEXR: the writers, and readers of what the files say of their pixels
 import struct, zlib
-def png(path, *extra): # 16-bit RGB; extra: name and data of further chunks
-    chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
-    open(path, 'wb').write(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', 1, 1, 16, 2, 0, 0, 0)) + b''.join(chunk(*e) for e in extra) +
-        chunk(b'IDAT', zlib.compress(b'\0' + struct.pack('>3H', 1000, 20000, 60000))) + chunk(b'IEND', b''))
+def picture(path, w, h, bits, kind, data, *extra): # kind: 0 grey, 2 RGB; extra: name and data of further chunks
+    chunk = lambda name, data: struct.pack('>I', len(data)) + name + data + struct.pack('>I', zlib.crc32(name + data))
+    row = len(data) // h
+    rows = b''.join(b'\0' + data[y * row:(y + 1) * row] for y in range(h))
+    open(path, 'wb').write(b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', struct.pack('>IIBBBBB', w, h, bits, kind, 0, 0, 0)) + b''.join(chunk(*e) for e in extra) +
+        chunk(b'IDAT', zlib.compress(rows)) + chunk(b'IEND', b''))
+def png(path, *extra): # one pixel of 16-bit RGB
+    picture(path, 1, 1, 16, 2, struct.pack('>3H', 1000, 20000, 60000), *extra)
 def chunks(path):
     data, at, found = open(path, 'rb').read(), 8, {}
     while at < len(data):
@@ -26,15 +30,16 @@ def profile(): # linear values, sRGB's primaries adapted to D50
     return head.ljust(128, b'\0') + table + body
 P3 = .68, .32, .265, .69, .15, .06, .3127, .329
 RGB = [('B', 1, .25), ('G', 1, .5), ('R', 1, .75)]
-def exr(path, channels, primaries=None): # channels: name, type (0 uint, 1 half, 2 float), value
+def exr(path, channels, primaries=None, w=1, h=1): # channels: name, type (0 uint, 1 half, 2 float), value or what gives it of x and y
     listed = b''.join(n.encode() + b'\0' + struct.pack('<iB3xii', t, 0, 1, 1) for n, t, v in channels) + b'\0'
-    row = b''.join(struct.pack('<' + 'Ief'[t], v) for n, t, v in channels)
-    one = struct.pack('<f', 1)
-    attributes = [(b'channels', b'chlist', listed), (b'compression', b'compression', b'\0'), (b'dataWindow', b'box2i', bytes(16)), (b'displayWindow', b'box2i', bytes(16)),
+    rows = [b''.join(struct.pack('<' + 'Ief'[t], v(x, y) if callable(v) else v) for n, t, v in channels for x in range(w)) for y in range(h)]
+    one, box = struct.pack('<f', 1), struct.pack('<4i', 0, 0, w - 1, h - 1)
+    attributes = [(b'channels', b'chlist', listed), (b'compression', b'compression', b'\0'), (b'dataWindow', b'box2i', box), (b'displayWindow', b'box2i', box),
         (b'lineOrder', b'lineOrder', b'\0'), (b'pixelAspectRatio', b'float', one), (b'screenWindowCenter', b'v2f', bytes(8)), (b'screenWindowWidth', b'float', one)]
     if primaries: attributes.append((b'chromaticities', b'chromaticities', struct.pack('<8f', *primaries)))
     head = b'\x76\x2f\x31\x01\2\0\0\0' + b''.join(name + b'\0' + kind + b'\0' + struct.pack('<i', len(data)) + data for name, kind, data in attributes) + b'\0'
-    open(path, 'wb').write(head + struct.pack('<Qii', len(head) + 8, 0, len(row)) + row)
+    at = lambda y: len(head) + 8 * h + y * (8 + len(rows[0]))
+    open(path, 'wb').write(head + b''.join(struct.pack('<Q', at(y)) for y in range(h)) + b''.join(struct.pack('<ii', y, len(r)) + r for y, r in enumerate(rows)))
 def headers(path): # the attributes of each part
     f = open(path, 'rb').read()
     multi, at, parts = f[5] & 0x10, 8, []

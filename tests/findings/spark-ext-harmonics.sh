@@ -7,20 +7,11 @@
 . "$(dirname "$0")/lib.sh"
 packages @sparkjsdev/spark@2.2.0 three@0.187.0
 node --input-type=module - <<'END'
-import { Worker as Thread } from 'node:worker_threads';
-import { buffer, rows, splat, vertices, write } from './files.mjs';
-globalThis.Worker = class { // spark reads in a Worker of browsers: here its code runs in a thread of node
-    constructor(url) {
-        const self = "const self = require('node:worker_threads').parentPort, postMessage = self.postMessage.bind(self); self.location = {href: 'file:///'};\n";
-        this.thread = new Thread(self + decodeURIComponent(url.replace(/^[^,]*,/, '')), {eval: true, execArgv: []}).on('message', data => this.onmessage({data}));
-    }
-    postMessage(...words) { this.thread.postMessage(...words); }
-};
-setTimeout(() => { console.log('spark does not answer'); process.exit(2); }, 30000);
+import { buffer, rows, spark, splat, vertices, write } from './files.mjs';
 const greys = [0.25, 0.3, 0.4, 0.49, 0.5, 0.6], harmonics = [...greys.map(v => [v, v, v]), [0.49, 0.3, 0.1], [-0.49, 0.3, 0.1]];
 const splats = harmonics.map(rgb => Object.assign({...splat}, ...rgb.flatMap(v => [0, v, 0]).map((v, i) => ({['f_rest_' + i]: v})))); // z of degree 1
 write('in.ply', vertices(splats), rows(splats));
-const { ExtSplats, PackedSplats, SplatFileType, utils } = await import('@sparkjsdev/spark');
+const { ExtSplats, PackedSplats, SplatFileType, utils } = await spark();
 const load = async kind => {
     const loaded = new kind({fileBytes: new Uint8Array(buffer('in.ply')), fileType: SplatFileType.PLY});
     await loaded.initialized;

@@ -9,24 +9,8 @@ packages @sparkjsdev/spark@2.2.0 three@0.187.0 @babylonjs/core@9.28.0 playcanvas
 node --input-type=module - <<'END'
 import { Asset, GSplatHandler, NullGraphicsDevice } from 'playcanvas'; // in front of what follows, which makes it take node for a browser
 import { GaussianSplattingMesh } from '@babylonjs/core/Meshes/GaussianSplatting/gaussianSplattingMesh.js';
-import { buffer, rows, splat, write } from './files.mjs';
-// spark reads in a Worker: node has none of that name, so its code runs here
-globalThis.window ??= globalThis;
-globalThis.document ??= {createElement: () => ({}), createElementNS: () => ({style: {}})};
-globalThis.Worker = class {
-    constructor(url) {
-        const listeners = new Set(), self = {location: {href: 'file:///'}};
-        self.addEventListener = (_, f) => listeners.add(f);
-        self.removeEventListener = (_, f) => listeners.delete(f);
-        self.postMessage = data => setTimeout(() => this.onmessage({data}));
-        self.self = self;
-        this.postMessage = data => setTimeout(() => [...listeners].forEach(f => f({data})));
-        new Function('self', 'postMessage', decodeURIComponent(url.replace(/^data:[^,]*,/, '')))(self, self.postMessage);
-    }
-    addEventListener() {}
-};
-setTimeout(() => { console.log('spark does not answer'); process.exit(2); }, 30000);
-const { ExtSplats } = await import('@sparkjsdev/spark');
+import { buffer, rows, spark, splat, write } from './files.mjs';
+const { ExtSplats } = await spark();
 const readers = { // radius along x, opacity, red
     spark: async file => {
         const splats = new ExtSplats({fileBytes: new Uint8Array(buffer(file)), fileName: file}), seen = [];
