@@ -1700,7 +1700,7 @@ static void ssdgs__light_map_end(const ssdgs__tile *tile, const unsigned char *l
         ssdgs_light_pixel *at = tile->light_map + i;
         for (int l = levels[i]; l < SSDGS__MAP_STEPS; l++) {
             at->distance[l] = SSDGS__NEVER;
-            if (l < 2) at->left[l] = 0;
+            if (l < SSDGS__MAP_STEPS - 1) at->left[l] = 0;
             if (l) at->before[l - 1] = 0;
         }
         at->behind = transmittance[i];

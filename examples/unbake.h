@@ -216,12 +216,16 @@ static inline double unbake__plane(const unbake__state *u, int k, double plane[3
         for (int i = 0; i < u->count; i++) {
             const unbake__splat *s = u->splat + i;
             const double along = unbake__dot(plane, s->axis),
-                         weight = (double)s->weight * seen[i] * fabs(unbake__dot(u->sky[k], s->axis)),
-                         at = UNBAKE__LAYERS / 2 * (1 + unbake__height(u, plane, s) / (u->size + 1e-30));
+                         weight = (double)s->weight * seen[i] * fabs(unbake__dot(u->sky[k], s->axis));
             if (!pass) all += weight;
             if (fabs(along) < UNBAKE__FLAT) continue;
-            for (int c = 0; c < 3 && !pass; c++) sum[c] += weight * (along < 0 ? -1 : 1) * (double)s->axis[c];
-            if (pass && at >= 0 && at < UNBAKE__LAYERS) layer[(int)at] += weight;
+            if (!pass) {
+                for (int c = 0; c < 3; c++) sum[c] += weight * (along < 0 ? -1 : 1) * (double)s->axis[c];
+                continue;
+            }
+            const double height = unbake__height(u, plane, s) / (u->size + 1e-30),
+                         at = UNBAKE__LAYERS / 2 * (1 + height);
+            if (at >= 0 && at < UNBAKE__LAYERS) layer[(int)at] += weight;
         }
     }
     for (int j = 0; j <= UNBAKE__LAYERS - UNBAKE__THICK; j++) {
@@ -238,29 +242,29 @@ static inline double unbake__plane(const unbake__state *u, int k, double plane[3
    not count. */
 static inline void unbake__stand(unbake__state *u) {
     const double half = u->size * UNBAKE__THICK / UNBAKE__LAYERS;
-    double best = 0, up[3] = {0, 0, 0}, middle = 0, above = 0, seen[2] = {0, 0};
+    double best = 0, normal[3] = {0, 0, 0}, middle = 0, above = 0, seen[2] = {0, 0};
     for (int k = 0; k < UNBAKE__SKY; k++) {
         double plane[3], at = 0;
         const double share = unbake__plane(u, k, plane, &at);
         if (share <= best) continue;
         best = share, middle = at;
-        memcpy(up, plane, sizeof up);
+        memcpy(normal, plane, sizeof normal);
     }
     for (int i = 0; i < u->count; i++) {
         const unbake__splat *s = u->splat + i;
-        const double height = unbake__height(u, up, s) - middle;
+        const double height = unbake__height(u, normal, s) - middle;
         if (fabs(height) > half) above += height < 0 ? -(double)s->weight : (double)s->weight;
-        if (fabs(height) > half || fabs(unbake__dot(up, s->axis)) < UNBAKE__FLAT) continue;
+        if (fabs(height) > half || fabs(unbake__dot(normal, s->axis)) < UNBAKE__FLAT) continue;
         for (int k = 0; k < UNBAKE__SKY; k++) {
-            const double *d = u->sky[k], along = up[0] * d[0] + up[1] * d[1] + up[2] * d[2];
+            const double *d = u->sky[k], along = normal[0] * d[0] + normal[1] * d[1] + normal[2] * d[2];
             seen[along > 0] +=
                 (double)s->weight * fabs(along) * u->seen[(size_t)k * (size_t)u->count + (size_t)i];
         }
     }
-    const int stands = best > 0.4 && seen[above > 0] > 0.25 * seen[above <= 0];
+    const int side = above > 0, stands = best > 0.4 && seen[side] > 0.25 * seen[!side];
     for (int k = 0; k < UNBAKE__SKY; k++) {
-        const double *d = u->sky[k], along = up[0] * d[0] + up[1] * d[1] + up[2] * d[2];
-        u->used[k] = !stands || (above > 0 ? along : -along) > -UNBAKE__BELOW;
+        const double *d = u->sky[k], along = normal[0] * d[0] + normal[1] * d[1] + normal[2] * d[2];
+        u->used[k] = !stands || (side ? along : -along) > -UNBAKE__BELOW;
     }
 }
 
