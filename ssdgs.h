@@ -6780,8 +6780,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int s = 0; !lit && s < SSDGS__BLOCK; s++) outs[SSDGS__OUT_SHADOW * SSDGS__BLOCK + s] += 1;
         if (!lit) continue;
         k->reflect(lighting, gauss, part + l->rows);
-        ssdgs_real *visibility = part + l->visibility, *cue = part + l->cue, light_in[SSDGS__BLOCK],
-                   facing[SSDGS__BLOCK];
+        ssdgs_real *visibility = part + l->visibility, *cue = part + l->cue, light_in[SSDGS__BLOCK];
         if (lighting->shadow) ssdgs__gather(frame->visibility + n * (size_t)light, at, fours, visibility);
         for (int s = 0; !lighting->shadow && s < SSDGS__BLOCK; s++) visibility[s] = 1;
         const int cued = lighting->scattering && settings->depth_cue && casts;
@@ -6789,8 +6788,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int s = 0; s < SSDGS__BLOCK; s++) {
             const ssdgs_real irradiance = part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
             cue[s] = cued ? cue[s] / (o->scale * o->translucency) : 0;
-            light_in[s] = irradiance > 0 ? irradiance : 1;
-            facing[s] = irradiance > 0;
+            light_in[s] = irradiance > 0 ? irradiance : 1; /* 0: the light is too far to be told from none */
         }
         for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS; i++) {
             ssdgs_real *to =
@@ -6799,8 +6797,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
                              even = casts ? 0 : (ssdgs_real)ssdgs__beneath_plane(i);
             const size_t first = (blocks * (size_t)light * SSDGS__LENGTHS + (size_t)i) * SSDGS__BLOCK;
             if (casts) ssdgs__gather(job->transport + first, sums, sums_fours, to);
-            for (int s = 0; s < SSDGS__BLOCK; s++)
-                to[s] = casts ? to[s] / light_in[s] * facing[s] : cosine[s] * even;
+            for (int s = 0; s < SSDGS__BLOCK; s++) to[s] = casts ? to[s] / light_in[s] : cosine[s] * even;
         }
         if (l->shadow_layers && lighting->shadow) {
             shadow = part + l->scattering_at - SSDGS__BLOCK;

@@ -83,7 +83,7 @@ runs() {
     case $1 in
         t_gradient_64) compile="$cc -O1 -DSSDGS_REAL64" ;;
         *_64) compile="$quick -DSSDGS_REAL64" ;;
-        t_train) compile="$cc -O1 -DSSDGS_NO_AVX2" ;;
+        t_train | t_scene | t_fast | t_batch) compile="$cc -O1 -DSSDGS_NO_AVX2" ;;
         *) compile="$cc -O0 -DSSDGS_NO_AVX2" ;;
     esac
     nice $compile "$work/tests/${1%_64}.c" -o "$work/$1" -lm -lpthread >"$work/log" 2>&1 || return 2

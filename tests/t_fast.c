@@ -325,6 +325,45 @@ static void test_walk(void) {
     pool_empty();
 }
 
+/* A round Gaussian at the picture's corner, whose box holds the corner's pixel and whose own pixels all lie
+   beside the picture, is not shaded. */
+static void test_beside_the_picture(void) {
+    static const double at[2] = {2.5, 6.2};
+    const ssdgs_real eye[3] = {0, -3, 0};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, (ssdgs_real)0.6, 5, 5);
+    const ssdgs_render_options options = ssdgs_render_options_exact();
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        ssdgs_context *context = NULL;
+        ssdgs_model *model = NULL;
+        ssdgs_context_desc desc;
+        memset(&desc, 0, sizeof desc);
+        desc.isa = (ssdgs_isa)isa;
+        if (!ssdgs__table(isa)) continue;
+        if (!CHECK(!ssdgs_context_create(&desc, &context)) ||
+            !CHECK(!ssdgs_model_create(context, NULL, 2, &model)))
+            exit(1);
+        for (int i = 0; i < 2; i++) {
+            ssdgs_gaussian g = ssdgs_gaussian_default();
+            g.position[0] = (ssdgs_real)((at[i] - (double)camera.cx) * 3 / (double)camera.fx);
+            g.position[2] = (ssdgs_real)((at[i] - (double)camera.cy) * -3 / (double)camera.fy);
+            for (int c = 0; c < 3; c++) g.scale[c] = (ssdgs_real)0.3;
+            g.opacity = (ssdgs_real)0.03; /* it ends two pixels from its centre */
+            CHECK(!ssdgs_model_set(model, i, &g));
+        }
+        ssdgs_real color[5 * 5 * 3], alpha[5 * 5], most = 0;
+        ssdgs_image out;
+        ssdgs_render_stats stats;
+        memset(&out, 0, sizeof out);
+        out.color = color;
+        out.alpha = alpha;
+        CHECK(!ssdgs_render_ex(model, &camera, NULL, 0, &options, &out, &stats));
+        for (int i = 0; i < 5 * 5; i++) most = alpha[i] > most ? alpha[i] : most;
+        CHECK(most == alpha[2 * 5 + 2] && most > (ssdgs_real)0.02 && stats.shaded == 1);
+        ssdgs_model_destroy(model);
+        ssdgs_context_destroy(context);
+    }
+}
+
 /* In every pixel the weights of what is left unshaded sum to max_error at most, and the stages say what was
    left. */
 static void test_max_error(void) {
@@ -600,6 +639,7 @@ static void test_all_glimpsed(void) {
 int main(void) {
     test_kept();
     test_walk();
+    test_beside_the_picture();
     test_max_error();
     test_spent_budget();
     test_all_glimpsed();
