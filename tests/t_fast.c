@@ -325,6 +325,27 @@ static void test_walk(void) {
     pool_empty();
 }
 
+/* Whether values are within bounds: whatever their number, and wherever the one is that is not. */
+static void test_within(void) {
+    enum { MANY = 37 };
+    const ssdgs_real outside[4] = {(ssdgs_real)2.5, (ssdgs_real)-2.5, (ssdgs_real)INFINITY, (ssdgs_real)NAN};
+    for (int isa = SSDGS_ISA_SCALAR; isa < SSDGS_ISA_COUNT; isa++) {
+        const ssdgs__kernels *k = ssdgs__table(isa);
+        for (size_t n = 0; k && n <= MANY; n++) {
+            ssdgs_real values[MANY + 1];
+            for (size_t i = 0; i <= n; i++) values[i] = i % 2 ? 2 : -2;
+            values[n] = 9;
+            CHECK(k->within(values, n, 2));
+            for (size_t i = 0; i < 4 * n; i++) {
+                const ssdgs_real was = values[i / 4];
+                values[i / 4] = outside[i % 4];
+                CHECK(!k->within(values, n, 2));
+                values[i / 4] = was;
+            }
+        }
+    }
+}
+
 /* A round Gaussian at the picture's corner, whose box holds the corner's pixel and whose own pixels all lie
    beside the picture, is not shaded. */
 static void test_beside_the_picture(void) {
@@ -639,6 +660,7 @@ static void test_all_glimpsed(void) {
 int main(void) {
     test_kept();
     test_walk();
+    test_within();
     test_beside_the_picture();
     test_max_error();
     test_spent_budget();
