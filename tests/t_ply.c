@@ -1096,6 +1096,27 @@ static void check_again(ssdgs_context *other, ssdgs_model **model, const ssdgs_m
     free(before.data);
 }
 
+/* What an editor did to a few, in their place, stays however little it is: nothing says the model moved. */
+static void test_nudged(void) {
+    ssdgs_model *original = drawn_model(), *model = drawn_model();
+    ssdgs_model_view to = ssdgs_model_arrays(model), from = ssdgs_model_arrays(original);
+    memcpy(to.gaussians, from.gaussians, sizeof(ssdgs_real) * SSDGS_CHANNELS * to.stride);
+    for (size_t i = 0; i < DRAWN; i += 10)
+        for (size_t c = 0; c < SSDGS_OPACITY; c++) to.gaussians[c * to.stride + i] += (ssdgs_real)1e-5;
+    for (int lost = 0; lost < 2; lost++) {
+        CHECK(!ADOPT(model, lost, original) && same_globals(model, original));
+        to = ssdgs_model_arrays(model);
+        for (size_t i = 0; i < DRAWN; i++)
+            for (size_t c = 0; c < SSDGS_OPACITY; c++) {
+                const ssdgs_real is = to.gaussians[c * to.stride + i],
+                                 was = from.gaussians[c * from.stride + i];
+                CHECK(i % 10 ? !(is < was) && !(is > was) : fabs((double)(is - was) - 1e-5) < 1e-6);
+            }
+    }
+    ssdgs_model_destroy(original);
+    ssdgs_model_destroy(model);
+}
+
 /* What tells little, or nothing, or cannot be told. */
 static void test_few_placed(void) {
     static const edit turned = {{0.6, 0, -0.8}, 70, 2, {1, 0, -3}, 0};
@@ -1849,6 +1870,7 @@ int main(void) {
     test_versions();
     test_origin();
     test_placed();
+    test_nudged();
     test_few_placed();
     test_numbers();
     test_order();
