@@ -80,7 +80,7 @@ static double objective(const scene *s, ssdgs_model *model, const ssdgs_camera *
         for (int i = 1; i < frame->view_count; i++) frame->views[i] = fixed->views[i];
     }
     frame->visibility_given = s->given;
-    for (size_t i = 0; i < pixels && s->given; i++)
+    for (size_t i = 0; i < pixels * (size_t)s->light_count && s->given; i++)
         frame->pixel_visibility[i] = 0.5 + 0.6 * sin(0.7 * (double)i);
     for (size_t i = 0; i < COUNT; i++) frame->seen[i] = 1;
     if (ssdgs__run_stages(frame, SSDGS_STAGE_SHADE, SSDGS_STAGE_COMPOSITE)) exit(1);
@@ -883,7 +883,7 @@ int main(void) {
     s = base, s.name = "light amid them, six maps", s.light_count = 2;
     for (int i = 0; i < 3; i++) s.lights[0].position[i] = i == 0 ? 0.5 : i == 1 ? -0.4 : 0.2;
     run(&s);
-    s = base, s.name = "pixels' visibility given", s.given = 1;
+    s = base, s.name = "pixels' visibility given, two lights", s.given = 1, s.light_count = 2;
     run(&s);
     for (int i = 0; i < 3; i++) { /* highlights per pixel, per Gaussian, and light that scatters */
         static const char *const names[3] = {"directional light", "directional light, geometric ASG",
