@@ -810,6 +810,44 @@ static void test_stray(void) {
     ssdgs_model_destroy(model);
 }
 
+/* A second light that is dark changes no gradient, whatever an earlier photograph has left in memory. */
+static void test_dark_light(const scene *base) {
+    static const ssdgs_real eye[3] = {0.3, -1.9, 0.4}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
+    const ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 0.7, SIDE, SIDE);
+    for (int asg = 0; asg < 2; asg++) {
+        scene s = *base;
+        ssdgs_model *model = NULL;
+        ssdgs_real *gradient[2];
+        size_t size = 0;
+        double most = 0;
+        int wrong = 0;
+        s.settings.asg = asg ? SSDGS_ASG_GEOMETRIC : SSDGS_ASG_DEFERRED;
+        for (int c = 0; c < 3; c++) s.lights[1].intensity[c] = 0;
+        if (!CHECK(!ssdgs_model_create(context, &s.settings, COUNT, &model))) exit(1);
+        fill(model);
+        for (s.light_count = 2; s.light_count; s.light_count--) {
+            ssdgs_frame frame;
+            objective(&s, model, &camera, s.lights, NULL, &frame, 1);
+            if (s.light_count == 2) {
+                ssdgs__buffer *before = &frame.scratch->activations;
+                memset(before->memory, 255, before->bytes); /* NaN */
+                objective(&s, model, &camera, s.lights, NULL, &frame, 1);
+            }
+            const size_t own = model->capacity * SSDGS_CHANNELS;
+            size = own + model->global_count;
+            ssdgs_real *to = gradient[s.light_count - 1] = (ssdgs_real *)malloc(size * sizeof *to);
+            memcpy(to, frame.gradient, own * sizeof *to);
+            memcpy(to + own, frame.global_gradient, model->global_count * sizeof *to);
+        }
+        for (size_t i = 0; i < size; i++) most = fmax(most, fabs(gradient[0][i]));
+        for (size_t i = 0; i < size; i++) wrong += !(fabs(gradient[1][i] - gradient[0][i]) <= 1e-12 * most);
+        CHECK(most > 0.01 && !wrong);
+        free(gradient[0]);
+        free(gradient[1]);
+        ssdgs_model_destroy(model);
+    }
+}
+
 int main(void) {
     if (!CHECK(!ssdgs_context_create(NULL, &context))) return 1;
     test_rotation();
@@ -941,6 +979,7 @@ int main(void) {
         for (int c = 0; c < 3; c++) s.options.ambient[0][c] = 0.4 + 0.9 * c;
         run(&s);
     }
+    test_dark_light(&base);
     test_held();
     test_fade();
     test_stray();
