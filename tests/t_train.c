@@ -1770,7 +1770,7 @@ static void test_cap(void) {
     options.prune_outside = 0;
     options.densify_gradient = 1;
     options.surplus = 1;
-    for (int pass = 0; pass < 3; pass++) {
+    for (int pass = 0; pass < 4; pass++) {
         options.max_gaussians = pass ? MANY : MANY / 2;
         CHECK(!ssdgs_context_create(NULL, &context));
         CHECK(!ssdgs_model_create(context, NULL, MANY, &model));
@@ -1785,7 +1785,7 @@ static void test_cap(void) {
             trainer->worth[i] = i >= MANY - UNSEEN ? 0 : 50;
             trainer->screen_gradient[i] = i == 0 && pass ? 2 : 0;
         }
-        trainer->run.iteration = pass == 2 ? 40 : 50; /* opacities are reset at 30 */
+        trainer->run.iteration = pass == 3 ? 10 : pass == 2 ? 40 : 50; /* opacities are reset at 30 first */
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == options.max_gaussians);
         int i, found;
