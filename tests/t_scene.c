@@ -2270,8 +2270,8 @@ static int as_new(const ssdgs_object *objects, int count, const ssdgs_camera *ca
     return same(shot, shot + 1);
 }
 
-/* A light keeps its trees of transport while a model that it does not reach gives way to one of another size:
-   those behind it lie elsewhere, also for Gaussians that come into view. */
+/* A light keeps its trees of transport while a model that it does not reach gives way to one of another size,
+   or without a tree: those behind it lie elsewhere, also for Gaussians that come into view. */
 static void test_moved_trees(void) {
     const ssdgs_real eye[3] = {(ssdgs_real)-1.5, -2, (ssdgs_real)0.3}, target[3] = {-2, 0, 0},
                      up[3] = {0, 0, 1};
@@ -2282,18 +2282,23 @@ static void test_moved_trees(void) {
     s.shadow.layers = s.scattering.layers = 0;
     s.depth_cue = 0;
     for (int c = 0; c < 3; c++) s.medium.scattering[c] = 20, s.medium.absorption[c] = (ssdgs_real)0.1;
-    ssdgs_model *models[4] = {cloud(&s, 0, 60, 0.3), cloud(&s, 400, 10, 0.3), cloud(&s, 800, 150, 0.5),
-                              cloud(&s, 600, 64, 0.3)};
+    ssdgs_settings bare = s;
+    bare.terms &= ~SSDGS_SCATTERING_TERM;
+    ssdgs_model *models[5] = {cloud(&s, 0, 60, 0.3), cloud(&s, 400, 10, 0.3), cloud(&s, 800, 150, 0.5),
+                              cloud(&s, 600, 64, 0.3), cloud(&bare, 400, 10, 0.3)};
     ssdgs_light light = point_light(0, -1.5, 1.5);
     light.range = 4;
     ssdgs_object objects[3];
     for (int i = 0; i < 3; i++) objects[i] = ssdgs_object_default(models[i]);
     objects[0].to_world[3] = (ssdgs_real)-1.5;
     objects[1].to_world[3] = 8;
-    together(objects, 3, &apart, &light, 1, &options, shot);
-    objects[1].model = models[3];
-    CHECK(as_new(objects, 3, &all, &light, &options) && shot->stats.lights_cached == 1);
-    for (int i = 0; i < 4; i++) ssdgs_model_destroy(models[i]);
+    for (int other = 3; other < 5; other++) {
+        objects[1].model = models[1];
+        together(objects, 3, &apart, &light, 1, &options, shot);
+        objects[1].model = models[other];
+        CHECK(as_new(objects, 3, &all, &light, &options) && shot->stats.lights_cached == 1);
+    }
+    for (int i = 0; i < 5; i++) ssdgs_model_destroy(models[i]);
 }
 
 /* Scattering asks lights for the depth of what they light, also where it is dark; other terms do not. Which
