@@ -2161,6 +2161,23 @@ static int outlined(const ssdgs_photo *shots, int count, double aside, const dou
     return share > 0 && (!seen || (outside > share * seen && (seen < 8 || outside > 1)));
 }
 
+/* A photograph shows too much beside the bounds where that is more than a tenth of what it shows. */
+static void test_shows_beside(void) {
+    static unsigned char own[4 * SIDE * SIDE];
+    ssdgs_train_options options = short_run(10);
+    ssdgs_photo photo = photos[0];
+    photo.pixels = own;
+    for (int c = 0; c < 3; c++)
+        options.bounds_min[c] = (ssdgs_real)-0.2, options.bounds_max[c] = (ssdgs_real)0.2;
+    for (int beside = 1; beside < 4; beside++) {
+        memset(own, 0, sizeof own);
+        for (int i = 0; i < 18; i++)
+            own[4 * ((SIDE / 2 + i / 6 - 1) * SIDE + SIDE / 2 + i % 6 - 3) + 3] = 255;
+        for (int i = 0; i < beside; i++) own[4 * i + 3] = 255; /* in a corner */
+        CHECK(ssdgs__shows_beside(&photo, &options) == (beside > 2));
+    }
+}
+
 /* Gaussians outside of the outlines go, and random points there are left out, as a count over the photographs
    in double says. */
 static void test_prune_outside(void) {
@@ -3001,6 +3018,7 @@ int main(void) {
     test_units();
     test_blur();
     test_resets();
+    test_shows_beside();
     test_prune_outside();
     test_nothing_in_view();
     test_outlines_known();
