@@ -6788,7 +6788,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
         for (int s = 0; s < SSDGS__BLOCK; s++) {
             const ssdgs_real irradiance = part[l->rows + (size_t)(SSDGS__IRRADIANCE * SSDGS__BLOCK + s)];
             cue[s] = cued ? cue[s] / (o->scale * o->translucency) : 0;
-            light_in[s] = irradiance > 0 ? irradiance : 1; /* 0: the light is too far to be told from none */
+            light_in[s] = irradiance > 0 ? irradiance : 1; /* 1 / distance^2 of a light very far away is 0 */
         }
         for (int i = 0; job->transport && settings->transport && i < SSDGS__LENGTHS; i++) {
             ssdgs_real *to =

@@ -1,7 +1,7 @@
 #!/bin/sh
 # usage: [CC=cc] sh tests/mutants.sh BUILD [first] [last]: do the tests notice wrong gradients? Each line of tests/mutants.txt changes
 # a copy of ssdgs.h, or of the header that "header: " names, in one place; a mutant is caught where one of its section's tests fails.
-# A line that fits nothing or does not compile is an error. Exits 0 when all are caught, after about three hours on one core. With
+# A line that fits nothing or does not compile is an error. Exits 0 when all are caught, after about five hours on one core. With
 # "fits" for first no test runs: does every line fit?
 set -u
 list=tests/mutants.txt header=ssdgs.h first=${2:-1} last=${3:-99999} number=0 caught=0 total=0 errors=0 by=

@@ -1762,7 +1762,8 @@ static void test_surplus(void) {
 /* Over the cap those go that show least where they are seen; those of photographs that were not drawn stay;
    none makes room while opacities recover. */
 static void test_cap(void) {
-    enum { MANY = 40, UNSEEN = 10 }; /* the last */
+    enum { MANY = 40, UNSEEN = 10 };           /* the last */
+    static const int at[4] = {50, 50, 40, 10}; /* opacities are reset at 30, and recover at 40 */
     ssdgs_train_options options = short_run(100);
     ssdgs_context *context = NULL;
     ssdgs_model *model = NULL;
@@ -1785,7 +1786,7 @@ static void test_cap(void) {
             trainer->worth[i] = i >= MANY - UNSEEN ? 0 : 50;
             trainer->screen_gradient[i] = i == 0 && pass ? 2 : 0;
         }
-        trainer->run.iteration = pass == 3 ? 10 : pass == 2 ? 40 : 50; /* opacities are reset at 30 first */
+        trainer->run.iteration = at[pass];
         CHECK(!ssdgs__densify(trainer));
         CHECK(model->count == options.max_gaussians);
         int i, found;
@@ -2171,7 +2172,7 @@ static void test_shows_beside(void) {
         options.bounds_min[c] = (ssdgs_real)-0.2, options.bounds_max[c] = (ssdgs_real)0.2;
     for (int beside = 1; beside < 4; beside++) {
         memset(own, 0, sizeof own);
-        for (int i = 0; i < 18; i++)
+        for (int i = 0; i < 18; i++) /* in the middle */
             own[4 * ((SIDE / 2 + i / 6 - 1) * SIDE + SIDE / 2 + i % 6 - 3) + 3] = 255;
         for (int i = 0; i < beside; i++) own[4 * i + 3] = 255; /* in a corner */
         CHECK(ssdgs__shows_beside(&photo, &options) == (beside > 2));
