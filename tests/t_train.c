@@ -2358,10 +2358,12 @@ static void test_wrong_outlines(void) {
 }
 
 enum { SHOTS = 16, WIDE = 48 };
+/* Colours: as they are; times alpha; that of a ball with a darker rim; a room under alpha 0, with a window at
+   the world's x. */
+enum { STRAIGHT, TIMES_ALPHA, DARK_RIM, OVER_ROOM };
 
-/* A white ball of radius 0.4 as a camera and a light see it, (WIDE,WIDE,4), matt; `multiplied`: colours are
-   times alpha. */
-static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, int multiplied,
+/* A white ball of radius 0.4 as a camera and a light see it, (WIDE,WIDE,4), matt. */
+static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, int colours,
                          unsigned char *out) {
     for (int y = 0; y < WIDE; y++)
         for (int x = 0; x < WIDE; x++) {
@@ -2396,8 +2398,12 @@ static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, i
             const double alpha = hits / 16;
             for (int c = 0; c < 3; c++) {
                 const ssdgs_real linear = (ssdgs_real)(hits > 0 ? 0.8 * sum / hits : 0);
-                const double stored = (double)ssdgs_srgb_encode(linear < 1 ? linear : 1);
-                out[4 * (y * WIDE + x) + c] = (unsigned char)(255 * stored * (multiplied ? alpha : 1) + 0.5);
+                double stored = (double)ssdgs_srgb_encode(linear < 1 ? linear : 1);
+                if (colours == TIMES_ALPHA || colours == DARK_RIM) stored *= alpha;
+                if (colours == DARK_RIM && alpha < 1) stored *= 0.6;
+                if (colours == OVER_ROOM && !(hits > 0))
+                    stored = 0.5 + (double)camera->view[0] * (x - WIDE / 2) / WIDE;
+                out[4 * (y * WIDE + x) + c] = (unsigned char)(255 * stored + 0.5);
             }
             out[4 * (y * WIDE + x) + 3] = (unsigned char)(255 * alpha + 0.5);
         }
@@ -2409,7 +2415,7 @@ static void ball_picture(const ssdgs_camera *camera, const ssdgs_light *light, i
 static void test_light_notes(void) {
     static const struct {
         const char *name;
-        int directional, above, multiplied, notes[2];
+        int directional, above, colours, notes[2];
         const char *reading;
     } cases[] = {{"right", 0, 0, 0, {NOTES, NOTES}, NULL},
                  {"right", 1, 0, 0, {NOTES, NOTES}, NULL},
@@ -2447,7 +2453,9 @@ static void test_light_notes(void) {
                  {"one", 1, 0, 0, {ONE_LIGHT, NOTES}, NULL},
                  {"flash", 0, 0, 0, {LIGHT_MOVES, NOTES}, NULL},
                  {"inside", 0, 0, 0, {LIT_WITHIN, NOTES}, NULL},
-                 {"right", 0, 0, 1, {MULTIPLIED, NOTES}, NULL}};
+                 {"right", 0, 0, OVER_ROOM, {NOTES, NOTES}, NULL},
+                 {"right", 0, 0, TIMES_ALPHA, {MULTIPLIED, NOTES}, NULL},
+                 {"right", 0, 0, DARK_RIM, {MULTIPLIED, NOTES}, NULL}};
     static unsigned char pictures[SHOTS][WIDE * WIDE * 4];
     const ssdgs_real centre[3] = {0, 0, 0}, up[3] = {0, 0, 1};
     ssdgs_train_options options = short_run(60);
@@ -2485,7 +2493,7 @@ static void test_light_notes(void) {
                     light->position[c] =
                         (ssdgs_real)((c == 2 ? 1 : 0) * away + (cases[i].directional ? 0 : shake));
             }
-            ball_picture(&shots[k].camera, light, cases[i].multiplied, pictures[k]);
+            ball_picture(&shots[k].camera, light, cases[i].colours, pictures[k]);
             shots[k].pixels = pictures[k];
             shots[k].format = SSDGS_PIXELS_RGBA8;
             ssdgs_real p[3];
