@@ -330,7 +330,8 @@ static inline int adopt__find(adopt__state *a, int together, const char **proble
             from[k] =
                 (double)original->gaussians[(SSDGS_POSITION + k) * original->stride + (size_t)a->match[i]];
             same = same && !(place[k] < from[k]) && !(place[k] > from[k]);
-            sound = sound && fabs(place[k]) < 1e15 && fabs(from[k]) < 1e15; /* finite, too */
+            sound = sound && ssdgs_finite((ssdgs_real)place[k]) && ssdgs_finite((ssdgs_real)from[k]) &&
+                    fabs(place[k]) < 1e15 && fabs(from[k]) < 1e15;
         }
         still += (size_t)same;
         /* some of all tell enough */

@@ -1048,11 +1048,12 @@ static void olat__exr_tiles(olat__exr *e) {
     olat__exr_take(e, 1); /* levels: the first is the whole image */
 }
 
+/* 0 for what is not finite. */
 static float olat__le_float(const unsigned char *p) {
     const uint32_t bits = olat__le32(p);
     float value;
     memcpy(&value, &bits, sizeof value);
-    return value;
+    return (bits & 0x7F800000) == 0x7F800000 ? 0 : value;
 }
 
 /* Reads what a part tells of itself. Attributes that only add something count where they are what their names
@@ -1527,19 +1528,19 @@ static const unsigned char *olat__exr_unpack(olat__exr *e, const unsigned char *
 }
 
 static float olat__from_half(unsigned half) {
-    const uint32_t bits = (half & 0x7FFF) << 13;
+    const uint32_t bits = ((half & 0x7FFF) << 13) + (112u << 23); /* what the exponents' biases differ by */
     float value;
     memcpy(&value, &bits, sizeof value);
-    value *= 5.192296858534828e33f; /* 2^112: what the exponents' biases differ by */
+    if (!(half & 0x7C00)) value = (float)(half & 1023) / 16777216; /* subnormal */
     return half & 0x8000 ? -value : value;
 }
 
 /* Of a number from 0 to 65504, to the nearest. */
 static uint16_t olat__to_half(float value) {
     uint32_t bits;
-    value *= 1.925929944387236e-34f;
+    if (value < 6.103515625e-5f) return (uint16_t)(value * 16777216 + 0.5f); /* subnormal */
     memcpy(&bits, &value, sizeof bits);
-    return (uint16_t)((bits + 0xFFF + (bits >> 13 & 1)) >> 13);
+    return (uint16_t)((bits + 0xFFF + (bits >> 13 & 1) - (112u << 23)) >> 13);
 }
 
 /* Puts a block's pixels where they lie in the display window. */

@@ -208,8 +208,8 @@ static inline void reduce__pair_task(void *data, int leaf) {
     unsigned taken = 0;
     for (int i = begin; i < end; i++)
         for (int j = i + 1; j < end; j++) {
-            const double cost = reduce__cost(r->blob + i, r->blob + j);
-            all[n].cost = cost < (double)REDUCE__NEVER ? (ssdgs_real)cost : REDUCE__NEVER;
+            const ssdgs_real cost = (ssdgs_real)reduce__cost(r->blob + i, r->blob + j);
+            all[n].cost = ssdgs_finite(cost) && cost < REDUCE__NEVER ? cost : REDUCE__NEVER;
             all[n].kept = (uint32_t)i;
             all[n++].gone = (uint32_t)j;
         }
@@ -308,8 +308,6 @@ static inline ssdgs_result reduce__round(reduce__state *r, int count) {
     return SSDGS_OK;
 }
 
-static inline int reduce__finite(ssdgs_real x) { return x - x <= 0; }
-
 /* Merges the rows until `count` are left. Those that no frame draws go first. */
 static inline ssdgs_result reduce__rows(reduce__state *r, int count) {
     ssdgs_result result = reduce__seen_around(r);
@@ -317,7 +315,7 @@ static inline ssdgs_result reduce__rows(reduce__state *r, int count) {
     r->count = 0;
     for (int i = 0; i < all; i++) {
         size_t c;
-        for (c = 0; c < SSDGS_DIFFUSE && reduce__finite(r->raw[c * r->rows + (size_t)i]); c++) {}
+        for (c = 0; c < SSDGS_DIFFUSE && ssdgs_finite(r->raw[c * r->rows + (size_t)i]); c++) {}
         if (c == SSDGS_DIFFUSE) r->left[r->count++] = (uint32_t)i;
     }
     if (!result) result = reduce__arrange(r);

@@ -172,7 +172,7 @@ static inline const char *sky_lights(const ssdgs_real *pixels, int width, int he
     if (light_count < 0 || light_count > 65536 || (light_count && !lights))
         return "an environment map becomes 0 to 65536 lights, for which there must be an array";
     for (size_t i = 0; i < 3 * (size_t)width * (size_t)height; i++)
-        if (!(pixels[i] >= 0 && pixels[i] <= (ssdgs_real)3e38))
+        if (!ssdgs_finite(pixels[i]) || pixels[i] < 0 || pixels[i] > (ssdgs_real)3e38)
             return "the environment map has values that are negative or not finite";
     sky__part *parts = (sky__part *)calloc((size_t)light_count + 1, sizeof *parts);
     if (!parts) return "out of memory";

@@ -182,15 +182,15 @@ static inline ssdgs_result unbake__read(unbake__state *u) {
         const double a = (double)g.scale[(least + 1) % 3], b = (double)g.scale[(least + 2) % 3];
         s->flat = (float)(1 - (double)g.scale[least] / (a < b ? a : b));
         s->weight = (float)((double)g.opacity * a * b);
-        int finite = s->flat - s->flat == 0 && s->weight - s->weight == 0;
+        int finite = ssdgs_finite((ssdgs_real)s->flat) && ssdgs_finite((ssdgs_real)s->weight);
         for (int c = 0; c < 3; c++) {
             const double stored = (double)g.diffuse[c];
             s->position[c] = (float)g.position[c];
             s->axis[c] = (float)axis[least][c];
             s->color[c] = (float)(linear ? stored : (double)ssdgs_srgb_decode((ssdgs_real)stored));
             sum += (double)s->color[c];
-            finite &= s->position[c] - s->position[c] == 0 && s->axis[c] - s->axis[c] == 0 &&
-                      s->color[c] - s->color[c] == 0;
+            finite &= ssdgs_finite(g.position[c]) && ssdgs_finite((ssdgs_real)axis[least][c]) &&
+                      ssdgs_finite((ssdgs_real)s->color[c]);
         }
         if (!finite) memset(s, 0, sizeof *s);
         for (int c = 0; c < 2; c++) s->hue[c] = finite ? (float)((double)s->color[c] / sum) : 0;
@@ -557,6 +557,10 @@ static inline ssdgs_result unbake__make(unbake__state *u, ssdgs_context *context
     return result;
 }
 
+static inline int unbake__within(double x, double low, double high) {
+    return ssdgs_finite((ssdgs_real)x) && x >= low && x <= high;
+}
+
 /* Looks at the options, and whether the light is told. What is left goes into settings, which are looked at
    there. */
 static inline ssdgs_result unbake__check(unbake__state *u, ssdgs_context *context) {
@@ -567,20 +571,20 @@ static inline ssdgs_result unbake__check(unbake__state *u, ssdgs_context *contex
     if (o->eye_count < 0 || o->eye_count > UNBAKE__SKY)
         what = "eye_count is not 0 .. 32: ", number = o->eye_count;
     else if (o->eye_count && !o->eyes) what = "eyes is NULL, eye_count ", number = o->eye_count;
-    else if (!(rough <= 0 && rough >= 0) && !(rough >= 0.01 && rough <= 1))
+    else if (!unbake__within(rough, 0, 0) && !unbake__within(rough, 0.01, 1))
         what = "roughness is neither 0 nor 0.01 .. 1: ", number = rough;
-    else if (!(f0 > 0 && f0 <= 1)) what = "f0 is not above 0, up to 1: ", number = f0;
+    else if (!unbake__within(f0, 0, 1) || f0 <= 0) what = "f0 is not above 0, up to 1: ", number = f0;
     for (int i = 0; i < 6 && !what; i++) {
         number = (double)(i < 3 ? o->scattering : o->absorption)[i % 3];
-        if (!(number >= 0)) what = "scattering or absorption is below 0: ";
+        if (!unbake__within(number, 0, 1e18)) what = "scattering or absorption is not 0 .. 1e18: ";
     }
     for (int i = 0; i < 3 * o->eye_count && !what; i++)
-        if (!(fabs((double)o->eyes[i / 3][i % 3]) < 1e18))
+        if (!unbake__within((double)o->eyes[i / 3][i % 3], -1e18, 1e18))
             what = "a place of eyes is not finite or too far: ", number = (double)o->eyes[i / 3][i % 3];
     for (int i = 0; i < 27 && !what; i++) {
         const double light = (double)o->ambient[i / 3][i % 3];
         u->told |= light < 0 || light > 0;
-        if (!(fabs(light) < 1e18) || (i < 3 && light < 0))
+        if (!unbake__within(light, i < 3 ? 0 : -1e18, 1e18))
             what = "ambient is not finite, or its mean is negative: ", number = light;
     }
     return what ? unbake__refuse(context, SSDGS_ERR_ARGUMENT, what, number) : SSDGS_OK;

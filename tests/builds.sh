@@ -19,7 +19,7 @@ check "exported, not in compile_c.c" \
     "$(for name in $(exported "$build/ssdgs.o"); do grep -qw "$name" tests/compile_c.c || echo "$name"; done)"
 # t_calls.c makes every call from within another, but for what only computes, reads or says
 pure='ssdgs_(context_(create|isa|threads|fail)|error_message|.*_(string|default|exact|fast|preview|published)|model_(settings|count|arrays|peek)'
-pure="$pure|camera_look_at|light_(point|directional|spot)|srgb_.*|to_.*|blend_pixels|compose|stage_cpu)"
+pure="$pure|camera_look_at|light_(point|directional|spot)|srgb_.*|finite|to_.*|blend_pixels|compose|stage_cpu)"
 check "exported, not in t_calls.c's call_everything" \
     "$(for name in $(exported "$build/ssdgs.o" | grep -Evx "$pure"); do grep -Eq "(REFUSED|IGNORED)\($name," tests/t_calls.c || echo "$name"; done)"
 check "exported with SSDGS_STATIC" "$(exported "$build/kernels.o")" # which is built with it

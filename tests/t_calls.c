@@ -789,6 +789,14 @@ static void test_halves(void) {
     CHECK((out[0] & 0x7FFF) > 0x7C00 && out[1] == 0x7C00 && out[2] == 0xFC00);
 }
 
+/* Also with -ffast-math. */
+static void test_finite_values(void) {
+    static const double good[6] = {0, -1, 1, 1e-45, 3.4e38, -3.4e38};
+    const double bad[4] = {(double)NAN, -(double)NAN, (double)INFINITY, -(double)INFINITY};
+    for (int i = 0; i < 6; i++) CHECK(ssdgs_finite((ssdgs_real)good[i]) == 1);
+    for (int i = 0; i < 4; i++) CHECK(ssdgs_finite((ssdgs_real)bad[i]) == 0);
+}
+
 /* color + (1 - alpha) x what is there, by light, in every format; nothing where alpha is 0. */
 static void test_blended(void) {
     enum { N = 400 };
@@ -889,6 +897,7 @@ static void test_pixels(void) {
                 CHECK(wrong == 0);
             }
     test_halves();
+    test_finite_values();
     test_blended();
     for (int x = 0; x < 3000; x++) {
         const double a = (x % 7 + 1) / 7.0, v = pow(10, -6 + 8.0 * x / 3000);
