@@ -108,11 +108,11 @@ static void olat__lens_sample(const float *light, int w, int h, const double at[
         for (int i = 0; i < 4; i++) {
             const float *v = light + 4 * (place[1][j] * (size_t)w + place[0][i]);
             const double share = weight[0][i] * weight[1][j];
-            const int near = (i == 1 || i == 2) && (j == 1 || j == 2);
+            const int nearest = (i == 1 || i == 2) && (j == 1 || j == 2);
             for (int c = 0; c < 4; c++) {
                 sum[c] += share * (double)v[c];
-                if (near && v[c] < least[c]) least[c] = v[c];
-                if (near && v[c] > most[c]) most[c] = v[c];
+                if (nearest && v[c] < least[c]) least[c] = v[c];
+                if (nearest && v[c] > most[c]) most[c] = v[c];
             }
         }
     for (int c = 0; c < 4; c++) sum[c] = fmin(fmax(sum[c], (double)least[c]), (double)most[c]);

@@ -1271,7 +1271,7 @@ OLAT__API void olat_box_side(const olat_dataset *set, int axis, double low, doub
 OLAT__API int olat_other_unit(const olat_dataset *set, const char *box, const ssdgs_real low[3],
                               const ssdgs_real high[3], char note[512]) {
     double size = 0, nearest = HUGE_VAL, farthest = 0;
-    int small = 0, inside = 0;
+    int tiny = 0, inside = 0;
     for (int c = 0; c < 3; c++) size = fmax(size, (double)(high[c] - low[c]));
     for (int i = 0; i < set->count; i++) {
         const ssdgs_camera *camera = &set->frames[i].camera;
@@ -1281,10 +1281,10 @@ OLAT__API int olat_other_unit(const olat_dataset *set, const char *box, const ss
         for (int c = 0; c < 3; c++) away[c] = (double)eye[c] - ((double)low[c] + (double)high[c]) / 2;
         const double distance = sqrt(olat__dot(away, away));
         nearest = fmin(nearest, distance), farthest = fmax(farthest, distance);
-        small += size * (double)camera->fx < 0.02 * distance * camera->width;
+        tiny += size * (double)camera->fx < 0.02 * distance * camera->width;
         inside += distance < 0.05 * size;
     }
-    if (!(size > 0) || (small < set->count && inside < set->count)) return 0;
+    if (!(size > 0) || (tiny < set->count && inside < set->count)) return 0;
     if (inside == set->count)
         snprintf(note, 512,
                  "%s is %.3g wide, and all cameras stand within %.3g of its middle: does the list have "

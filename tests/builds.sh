@@ -24,19 +24,19 @@ check "exported, not in t_calls.c's call_everything" \
     "$(for name in $(exported "$build/ssdgs.o" | grep -Evx "$pure"); do grep -Eq "(REFUSED|IGNORED)\($name," tests/t_calls.c || echo "$name"; done)"
 check "exported with SSDGS_STATIC" "$(exported "$build/kernels.o")" # which is built with it
 for option in NO_AVX2 NO_AVX512 REAL64; do compiles "SSDGS_$option" tests/library.c "$@" -DSSDGS_$option; done
-compiles "a name that Windows' headers take" tests/library.c "$@" -fsyntax-only -Dnear= -Dfar= -DNEAR= -DFAR= -DIN= -DOUT= -DOPTIONAL= -DPLANES=14 -DERROR=0 \
-    -Dsmall=char -Dinterface=struct
+windows='-Dnear= -Dfar= -DNEAR= -DFAR= -DIN= -DOUT= -DOPTIONAL= -DPLANES=14 -DERROR=0 -Dsmall=char -Dinterface=struct' # names that its headers take
+compiles "Windows' names" tests/library.c "$@" -fsyntax-only $windows
 # the kernels' short names are the includer's again afterwards
 printf '#define R 17\n#define V 18\n#define F 19\n#define VADD 20\n#define SSDGS_IMPLEMENTATION\n#include "ssdgs.h"
 extern int names[R == 17 && V == 18 && F == 19 && VADD == 20 ? 1 : -1];\n' >"$build/names.c"
 compiles "an includer's macros R, V, F, VADD" "$build/names.c" "$@" -I. -fsyntax-only
 for example in train relight minimal engine export view check ball unbake bench; do # each is a program of its own
-    compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only
+    compiles "$example.c alone" examples/$example.c "$@" -I"$build" -fsyntax-only $windows
 done
 for header in files json images flip olat judge reduce sky splats unbake; do # each includes what it needs, and nothing of it is left over; two know nothing of ssdgs.h
     case $header in files | json) : ;; *) echo '#include "ssdgs.h"' ;; esac >"$build/header.c"
     printf '#include "examples/%s.h"\nint main(void) { return 0; }\n' "$header" >>"$build/header.c"
-    compiles "$header.h alone" "$build/header.c" "$@" -I.
+    compiles "$header.h alone" "$build/header.c" "$@" -I. $windows
 done
 compiles "without SSDGS_SCALAR" tests/library.c "$@" -USSDGS_SCALAR -USSDGS_STAGES
 # renders OPTION WANTED WORD...: a program of those words, with the option, draws the wanted pictures: hashes of best and scalar kernels
