@@ -730,7 +730,7 @@ SSDGS_API ssdgs_result ssdgs_scene_light_map(ssdgs_scene *scene, int light, ssdg
 
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear); /* IEC 61966-2-1 */
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded);
-/* 0 where x is infinite or no number, with -ffast-math as well, which takes x - x for 0. */
+/* 1; 0: x is infinite or NaN. Also under -ffast-math, where comparisons do not tell. */
 SSDGS_API int ssdgs_finite(ssdgs_real x);
 /* Clamps, encodes by transfer and rounds (count) values to bytes, at most one level off. */
 SSDGS_API void ssdgs_to_bytes(const ssdgs_real *values, size_t count, int transfer, unsigned char *bytes);
@@ -1739,7 +1739,7 @@ static SSDGS__INLINE float ssdgs__exponent(float x) {
 /* How many harmonics there are up to a degree, but for the constant one. */
 static SSDGS__INLINE int ssdgs__harmonics(int degree) { return (degree + 1) * (degree + 1) - 1; }
 
-SSDGS_API int ssdgs_finite(ssdgs_real x) {
+static int ssdgs__finite(ssdgs_real x) {
 #ifdef SSDGS_REAL64
     uint64_t bits;
     memcpy(&bits, &x, 8);
@@ -2699,7 +2699,7 @@ static ssdgs_result ssdgs__number_check(ssdgs_context *context, const char *what
         const double value = ssdgs__number_get(n->type, (const unsigned char *)of + ssdgs__number_at(n, i));
         const char index[4] = {'[', (char)('0' + i), ']', 0};
         const int within = n->type == 'r' ? (float)value >= (float)low && (float)value <= (float)high &&
-                                                ssdgs_finite((ssdgs_real)value)
+                                                ssdgs__finite((ssdgs_real)value)
                                           : value >= low && value <= high;
         SSDGS__REFUSE(!within, "%s: %s%s = %g is not within %g .. %g", what, n->name, n->count ? index : "",
                       value, low, high);
@@ -2913,7 +2913,7 @@ static ssdgs_result ssdgs__globals_check(const ssdgs_model *model) {
     size_t first[SSDGS__GLOBAL_GROUPS + 1];
     ssdgs__global_groups(&model->settings, first);
     size_t i;
-    for (i = 0; ssdgs_finite(model->globals[i]); i++) {}
+    for (i = 0; ssdgs__finite(model->globals[i]); i++) {}
     int group;
     for (group = 0; i >= first[group + 1]; group++) {}
     return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE, "model: value %zu of %s is not finite",
@@ -2993,16 +2993,16 @@ static const char *ssdgs__gaussian_wrong(const ssdgs_gaussian *g) {
                                  g->rotation[1], g->rotation[2], g->rotation[3], g->normal[0],
                                  g->normal[1],   g->normal[2]};
     for (size_t i = 0; i < sizeof values / sizeof *values; i++)
-        if (!ssdgs_finite(values[i])) return i < 3 ? "position" : i < 7 ? "rotation" : "normal";
+        if (!ssdgs__finite(values[i])) return i < 3 ? "position" : i < 7 ? "rotation" : "normal";
     for (int i = 0; i < 3; i++) {
-        if (!(g->scale[i] > 0) || !ssdgs_finite(g->scale[i])) return "scale";
+        if (!(g->scale[i] > 0) || !ssdgs__finite(g->scale[i])) return "scale";
         if (!(g->diffuse[i] >= 0 && g->diffuse[i] <= most)) return "diffuse";
         if (!(g->specular[i] >= 0 && g->specular[i] <= most)) return "specular";
         if (!(g->scattering[i] >= 0 && g->scattering[i] <= most)) return "scattering";
-        if (i < 2 && (!(g->sharpness[i] > 0) || !ssdgs_finite(g->sharpness[i]))) return "sharpness";
+        if (i < 2 && (!(g->sharpness[i] > 0) || !ssdgs__finite(g->sharpness[i]))) return "sharpness";
     }
     for (int i = 0; i < SSDGS_MATERIAL_COUNT; i++)
-        if (!ssdgs_finite(g->material[i])) return "material";
+        if (!ssdgs__finite(g->material[i])) return "material";
     if (!(g->opacity >= 0 && g->opacity <= 1)) return "opacity";
     if (!(g->f0 > 0 && g->f0 <= 1)) return "f0";
     return g->softness >= 0 && g->softness <= 1 ? NULL : "softness";
@@ -3554,15 +3554,15 @@ SSDGS__SMALL_BEGIN
 static ssdgs_result ssdgs__camera_check(ssdgs_context *context, const ssdgs_camera *c, int mirrored) {
     SSDGS__REFUSE(c->width < 1 || c->height < 1 || c->width > SSDGS__MAX_SIDE || c->height > SSDGS__MAX_SIDE,
                   "camera: %d x %d pixels", c->width, c->height);
-    SSDGS__REFUSE(!(c->fx > 0) || !(c->fy > 0) || !ssdgs_finite(c->fx) || !ssdgs_finite(c->fy) ||
-                      !ssdgs_finite(c->cx) || !ssdgs_finite(c->cy) || !(c->near_plane >= 0) ||
-                      !ssdgs_finite(c->near_plane),
+    SSDGS__REFUSE(!(c->fx > 0) || !(c->fy > 0) || !ssdgs__finite(c->fx) || !ssdgs__finite(c->fy) ||
+                      !ssdgs__finite(c->cx) || !ssdgs__finite(c->cy) || !(c->near_plane >= 0) ||
+                      !ssdgs__finite(c->near_plane),
                   "camera: fx = %g, fy = %g, cx = %g, cy = %g, near_plane = %g: focal "
                   "lengths must be positive, near_plane not negative, all finite%s",
                   (double)c->fx, (double)c->fy, (double)c->cx, (double)c->cy, (double)c->near_plane,
                   c->fx > 0 || c->fx < 0 ? "" : "; is eye target, or the field of view in degrees?");
     for (int i = 0; i < 12; i++)
-        if (!ssdgs_finite(c->view[i]))
+        if (!ssdgs__finite(c->view[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: view[%d] is not finite", i);
     for (int i = 0; i < 3; i++)
         for (int j = 0; j <= i; j++) {
@@ -3585,7 +3585,7 @@ static ssdgs_result ssdgs__engine_matrix(ssdgs_context *context, const ssdgs_rea
     for (int i = 0; i < 16; i++) {
         const ssdgs_real value = from[flags & SSDGS_COLUMN_MAJOR ? i % 4 * 4 + i / 4 : i];
         to[i] = (double)value;
-        if (!ssdgs_finite(value))
+        if (!ssdgs__finite(value))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "camera: row %d, column %d of %s is not finite",
                                i / 4, i % 4, name);
     }
@@ -3779,7 +3779,7 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
             !o->model || o->model->context != context,
             o->model ? "object %d: its model is of another context" : "object %d: its model is NULL", i);
         for (int j = 0; j < 12; j++)
-            if (!ssdgs_finite(o->to_world[j]))
+            if (!ssdgs__finite(o->to_world[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "object %d: to_world[%d] is not finite", i,
                                    j);
         SSDGS__REFUSE(!(length2 >= 1e-24 && length2 <= 1e24), "object %d: to_world's scale is %g", i,
@@ -3792,7 +3792,7 @@ static ssdgs_result ssdgs__objects_check(ssdgs_context *context, const ssdgs_obj
                           "object %d: to_world is not a rotation times one scale", i);
         }
         for (int j = 0; j < 3; j++)
-            SSDGS__REFUSE(!(o->tint[j] >= 0) || !ssdgs_finite(o->tint[j]),
+            SSDGS__REFUSE(!(o->tint[j] >= 0) || !ssdgs__finite(o->tint[j]),
                           "object %d: tint[%d] = %g is negative or not finite", i, j, (double)o->tint[j]);
         SSDGS__REFUSE(!(o->roughness >= (ssdgs_real)0.1 && o->roughness <= 10) ||
                           !(o->translucency >= (ssdgs_real)0.1 && o->translucency <= 10) ||
@@ -3846,7 +3846,7 @@ static int ssdgs__gaussian_box(const ssdgs_placed *o, int index, ssdgs_real fain
     const ssdgs_real *p = g->gaussians + index;
     ssdgs_real largest = -SSDGS__RAW_LIMIT;
     int usable = p[SSDGS_OPACITY * g->stride] >= faint, j;
-    for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs_finite(p[(size_t)j * g->stride]);
+    for (j = 0; j < SSDGS_LOG_SCALE; j++) usable = usable && ssdgs__finite(p[(size_t)j * g->stride]);
     for (*log_scale = 0; j < SSDGS_OPACITY;
          j++) { /* at the upper clamp it would leave no pixel to the others; NaN fails too */
         const ssdgs_real s = p[(size_t)j * g->stride];
@@ -4139,9 +4139,9 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
         SSDGS__REFUSE((int)lights[i].kind < 0 || lights[i].kind > SSDGS_LIGHT_SPOT, "light %d: kind = %d", i,
                       (int)lights[i].kind);
         for (int j = 0; j < 3; j++) {
-            if (!directional && !ssdgs_finite(lights[i].position[j]))
+            if (!directional && !ssdgs__finite(lights[i].position[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "light %d: its position is not finite", i);
-            SSDGS__REFUSE(!(lights[i].intensity[j] >= 0) || !ssdgs_finite(lights[i].intensity[j]),
+            SSDGS__REFUSE(!(lights[i].intensity[j] >= 0) || !ssdgs__finite(lights[i].intensity[j]),
                           "light %d: intensity[%d] = %g is negative or not finite", i, j,
                           (double)lights[i].intensity[j]);
             norm2 += (double)along[j] * (double)along[j];
@@ -4159,7 +4159,7 @@ static ssdgs_result ssdgs__lights_check(ssdgs_context *context, const ssdgs_ligh
                       "light %d: the angles of its cone are %g and %g, where 0 <= first < second <= "
                       "pi is needed",
                       i, (double)cone[0], (double)cone[1]);
-        SSDGS__REFUSE(!(lights[i].range >= 0) || !ssdgs_finite(lights[i].range),
+        SSDGS__REFUSE(!(lights[i].range >= 0) || !ssdgs__finite(lights[i].range),
                       "light %d: range = %g is negative or not finite", i, (double)lights[i].range);
         SSDGS__REFUSE(!(lights[i].focus >= 0) || lights[i].focus > 1000,
                       "light %d: focus = %g is not in 0 .. 1000", i, (double)lights[i].focus);
@@ -4186,11 +4186,11 @@ static ssdgs_result ssdgs__occluder_check(ssdgs_context *context, const ssdgs_oc
                       4 * m->width);
         SSDGS__REFUSE(m->light < 0, "shadow map %d: light = %d is negative", i, m->light);
         SSDGS__REFUSE(m->flags & ~known, "shadow map %d: flags = %d has unknown bits", i, m->flags);
-        SSDGS__REFUSE(!(m->bias >= 0 && ssdgs_finite(m->bias) && m->range >= 0 && ssdgs_finite(m->range)),
+        SSDGS__REFUSE(!(m->bias >= 0 && ssdgs__finite(m->bias) && m->range >= 0 && ssdgs__finite(m->range)),
                       "shadow map %d: bias = %g or range = %g is negative or not finite", i, (double)m->bias,
                       (double)m->range);
         for (int j = 0; j < 16; j++)
-            if (!ssdgs_finite(m->matrix[j]))
+            if (!ssdgs__finite(m->matrix[j]))
                 return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "shadow map %d: its matrix is not finite",
                                    i);
     }
@@ -4240,11 +4240,11 @@ static ssdgs_result ssdgs__render_options_check(ssdgs_context *context, const ss
     SSDGS__TRY(
         ssdgs__numbers_check(context, "render options", ssdgs__render_numbers, SSDGS__RENDER_NUMBERS, o));
     for (int i = 0; i < 3; i++)
-        if (!ssdgs_finite(o->background[i]))
+        if (!ssdgs__finite(o->background[i]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "render options: background[%d] is not finite",
                                i);
     for (int i = 0; i < 27; i++)
-        if (!ssdgs_finite(o->ambient[i / 3][i % 3]))
+        if (!ssdgs__finite(o->ambient[i / 3][i % 3]))
             return ssdgs__fail(context, SSDGS_ERR_NONFINITE, "render options: ambient[%d][%d] is not finite",
                                i / 3, i % 3);
     return SSDGS_OK;
@@ -5504,7 +5504,7 @@ static void ssdgs__occlude_task(void *data, int index) {
             ssdgs__turn(o, 0, local, to);
             for (int c = 0; c < 3; c++) to[c] = to[c] * o->scale + o->offset[c];
             which[count] = o->first + i;
-            count += ssdgs_finite(to[0]) && ssdgs_finite(to[1]) && ssdgs_finite(to[2]);
+            count += ssdgs__finite(to[0]) && ssdgs__finite(to[1]) && ssdgs__finite(to[2]);
             if (count < SSDGS__POINTS) continue;
             ssdgs__occlude(frame, job->light, which, points, count);
             count = 0;
@@ -5971,7 +5971,7 @@ static void ssdgs__transport_task(void *data, int slot) {
             const int at = first + s < g->count ? first + s : g->count - 1;
             for (int k = 0; k < 3; k++) {
                 const ssdgs_real to = g->gaussians[(size_t)(SSDGS_POSITION + k) * g->stride + (size_t)at];
-                x[k * SSDGS__BLOCK + s] = ssdgs_finite(to) ? to : 0; /* not drawn; its neighbours are */
+                x[k * SSDGS__BLOCK + s] = ssdgs__finite(to) ? to : 0; /* not drawn; its neighbours are */
             }
             seen |= (frame->seen[o->first + at] == SSDGS_SEEN) << s / 16;
         }
@@ -6863,11 +6863,11 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
     for (int s = 0; s < live; s++) {
         const size_t g = at[s];
         ssdgs_real *to = outs + s, *color = frame->color + 4 * g;
-        int black = !ssdgs_finite(to[SSDGS__OUT_SHADOW * SSDGS__BLOCK]);
+        int black = !ssdgs__finite(to[SSDGS__OUT_SHADOW * SSDGS__BLOCK]);
         for (int c = 0; c < 3; c++) {
             color[c] = to[c * SSDGS__BLOCK] + to[(SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK] +
                        to[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK];
-            black |= !ssdgs_finite(color[c]);
+            black |= !ssdgs__finite(color[c]);
             for (int i = 1; i <= frame->layer_count && !sound; i++) {
                 const ssdgs_real value = ssdgs__layer(frame, i)[4 * g + (size_t)c];
                 black |= !(value <= most && value >= -most);
@@ -6888,7 +6888,7 @@ static void ssdgs__shade_block_of(const ssdgs__shade_job *job, int block, ssdgs_
             frame->diffuse[4 * g + (size_t)c] = to[c * SSDGS__BLOCK];
             frame->specular[4 * g + (size_t)c] = to[(SSDGS__OUT_SPECULAR + c) * SSDGS__BLOCK];
             frame->scattering[4 * g + (size_t)c] = to[(SSDGS__OUT_SCATTERING + c) * SSDGS__BLOCK];
-            frame->normal[4 * g + (size_t)c] = ssdgs_finite(normal[c]) ? normal[c] : 0;
+            frame->normal[4 * g + (size_t)c] = ssdgs__finite(normal[c]) ? normal[c] : 0;
         }
         frame->shadow[4 * g] =
             o->light_count ? to[SSDGS__OUT_SHADOW * SSDGS__BLOCK] / (ssdgs_real)o->light_count : 1;
@@ -7893,7 +7893,7 @@ static void ssdgs__render_statistics(const ssdgs_frame *frame, ssdgs_render_stat
         for (size_t i = 0; i < (size_t)g->count && !finite; i++)
             for (size_t c = 0; c < SSDGS_DIFFUSE; c++) {
                 const ssdgs_real value = g->gaussians[c * g->stride + i];
-                if (ssdgs_finite(value) || (c >= SSDGS_LOG_SCALE && ssdgs_finite(1 / value))) continue;
+                if (ssdgs__finite(value) || (c >= SSDGS_LOG_SCALE && ssdgs__finite(1 / value))) continue;
                 stats->rejected++;
                 break;
             }
@@ -8321,15 +8321,17 @@ SSDGS__SMALL_END
 #define SSDGS__SRGB_ENCODE ssdgs__srgb_encode_scalar
 #endif
 
+SSDGS_API int ssdgs_finite(ssdgs_real x) { return ssdgs__finite(x); }
+
 SSDGS_API ssdgs_real ssdgs_srgb_encode(ssdgs_real linear) {
     ssdgs_real out = linear;
-    if (ssdgs_finite(linear)) ssdgs__srgb_encode_scalar(&out, NULL, &linear, 1);
+    if (ssdgs__finite(linear)) ssdgs__srgb_encode_scalar(&out, NULL, &linear, 1);
     return out;
 }
 
 SSDGS_API ssdgs_real ssdgs_srgb_decode(ssdgs_real encoded) {
     ssdgs_real out = encoded;
-    if (ssdgs_finite(encoded)) ssdgs__srgb_decode_scalar(&out, &encoded, 1);
+    if (ssdgs__finite(encoded)) ssdgs__srgb_decode_scalar(&out, &encoded, 1);
     return out;
 }
 
@@ -10497,7 +10499,7 @@ static void ssdgs__finite_task(void *data, int index) {
     ssdgs__adam_range *r = job->range + index;
     if (job->k->within(r->gradient, r->n, SSDGS__MOST)) return;
     for (size_t i = 0; i < r->n && !r->bad; i++)
-        if (!ssdgs_finite(r->gradient[i])) r->bad = i + 1;
+        if (!ssdgs__finite(r->gradient[i])) r->bad = i + 1;
 }
 
 static void ssdgs__adam_task(void *data, int index) {
@@ -11268,14 +11270,14 @@ static ssdgs_result ssdgs__photo_check(ssdgs_context *context, const ssdgs_photo
     const size_t numbers = 4 * (size_t)photo->camera.width * (size_t)photo->camera.height;
     for (size_t i = 0; !result && ssdgs__is_light(photo) && i < numbers; i++) {
         const ssdgs_real number = ssdgs__photo_number(photo, i);
-        if (!ssdgs_finite(number))
+        if (!ssdgs__finite(number))
             result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "pixel %zu is not finite", i / 4);
         else if (i % 4 == 3 && (number < 0 || number > 1))
             result =
                 ssdgs__fail(context, SSDGS_ERR_ARGUMENT, "pixel %zu has alpha %g", i / 4, (double)number);
     }
     for (int i = 0; i < 3 && !result; i++)
-        if (!ssdgs_finite(background[i]))
+        if (!ssdgs__finite(background[i]))
             result = ssdgs__fail(context, SSDGS_ERR_NONFINITE, "background[%d] is not finite", i);
     context->subject = NULL;
     return result;
@@ -11780,7 +11782,7 @@ static ssdgs_result ssdgs__trainer_step(ssdgs_trainer *trainer, ssdgs_train_stat
                             (o->refine & SSDGS_REFINE_AMBIENT) != 0};
     for (int i = 0; i < SSDGS__CORRECTIONS * o->batch && !result; i++) {
         const int j = i % SSDGS__CORRECTIONS, of = j < 6 ? 0 : j < 9 ? 1 : j < 11 ? 2 : 3;
-        if (refines[of] && !ssdgs_finite((ssdgs_real)correction_gradient[i]))
+        if (refines[of] && !ssdgs__finite((ssdgs_real)correction_gradient[i]))
             result = ssdgs__fail(trainer->context, SSDGS_ERR_NONFINITE,
                                  "iteration %d refused: the gradient of photograph %d's %s is not finite",
                                  before, photos[i / SSDGS__CORRECTIONS],
@@ -11926,7 +11928,7 @@ static double ssdgs__model_unit(const ssdgs_model *model) {
         const ssdgs_real *x = model->gaussians + (size_t)(SSDGS_POSITION + c) * model->capacity;
         double low = 1e30, high = -1e30;
         for (int i = 0; i < model->count; i++) {
-            if (!ssdgs_finite(x[i])) continue;
+            if (!ssdgs__finite(x[i])) continue;
             low = (double)x[i] < low ? (double)x[i] : low;
             high = (double)x[i] > high ? (double)x[i] : high;
         }
@@ -11965,7 +11967,7 @@ static ssdgs_result ssdgs__refine_photo(ssdgs_model *model, ssdgs_photo *photo,
         double gradient[SSDGS__CORRECTIONS];
         ssdgs__moves_of(photo, correction.value, &frame, gradient);
         for (int j = 0; j < SSDGS__CORRECTIONS; j++)
-            if (!ssdgs_finite((ssdgs_real)gradient[j]))
+            if (!ssdgs__finite((ssdgs_real)gradient[j]))
                 return ssdgs__fail(model->context, SSDGS_ERR_NONFINITE,
                                    "refinement: a gradient is not finite");
         ssdgs__correction_step(&correction, photo, gradient, 0, rate, unit);
@@ -12164,7 +12166,7 @@ static int ssdgs__checkpoint_sound(const ssdgs__checkpoint_head *head, const uns
         for (size_t k = 0; k < sizes[part]; k++, at += sizeof(ssdgs_real)) {
             ssdgs_real x;
             memcpy(&x, at, sizeof x);
-            if (part && (!ssdgs_finite(x) || (part / 2 == 2 && x < 0))) return 0; /* 4, 5: second moments */
+            if (part && (!ssdgs__finite(x) || (part / 2 == 2 && x < 0))) return 0; /* 4, 5: second moments */
         }
     for (int i = 0; i < head->photo_count; i++, at += sizeof(ssdgs__correction)) {
         ssdgs__correction c;
@@ -15066,7 +15068,7 @@ SSDGS__FN int F(within)(const R *values, size_t n, R most) {
     for (; i + SSDGS__VW <= n; i += SSDGS__VW)
         bad |= V_BITS(V_GE(V_SET(most), V_ABS(V_LOAD(values + i)))) ^ ((1 << SSDGS__VW) - 1);
 #endif
-    for (; i < n; i++) bad |= !ssdgs_finite(values[i]) || values[i] > most || values[i] < -most;
+    for (; i < n; i++) bad |= !ssdgs__finite(values[i]) || values[i] > most || values[i] < -most;
     return !bad;
 }
 

@@ -110,7 +110,7 @@ static double colmap__real(colmap__file *f) {
     if (f->binary) {
         const uint64_t bits = colmap__bytes(f, 8);
         memcpy(&value, &bits, sizeof value);
-        if ((bits >> 52 & 0x7FF) == 0x7FF) value = 1e300; /* -ffast-math compares these as any number */
+        if ((bits >> 52 & 0x7FF) == 0x7FF) value = 1e300; /* -ffast-math compares NaN as a number */
     } else if (!f->failed) {
         const char *text = (const char *)f->bytes + f->at;
         size_t used = colmap__word(f) ? olat__parse_number(text = (const char *)f->bytes + f->at, &value) : 0;

@@ -189,7 +189,7 @@ static inline ssdgs_result unbake__read(unbake__state *u) {
             s->axis[c] = (float)axis[least][c];
             s->color[c] = (float)(linear ? stored : (double)ssdgs_srgb_decode((ssdgs_real)stored));
             sum += (double)s->color[c];
-            finite &= ssdgs_finite(g.position[c]) && ssdgs_finite((ssdgs_real)axis[least][c]) &&
+            finite &= ssdgs_finite((ssdgs_real)s->position[c]) && ssdgs_finite((ssdgs_real)s->axis[c]) &&
                       ssdgs_finite((ssdgs_real)s->color[c]);
         }
         if (!finite) memset(s, 0, sizeof *s);

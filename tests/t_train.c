@@ -598,7 +598,7 @@ static void test_lights(void) {
             light.intensity[c] = (ssdgs_real)(distance * distance + 0.01);
         }
         CHECK(!ssdgs_render(model, &photos[0].camera, &light, 1, &image));
-        for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs_finite(color[i]);
+        for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(color[i]);
         CHECK(finite);
         ssdgs_frame frame;
         CHECK(!ssdgs__frame_of_model(&frame, model, &photos[0].camera, &light, 1, NULL, 0, 0));
@@ -1648,7 +1648,7 @@ static void test_isolation(void) {
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
         image.color = color;
         CHECK(!ssdgs_render_ex(model, &photos[0].camera, &photos[0].light, 1, &render, &image, NULL));
-        for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs_finite(again[i]);
+        for (int i = 0; i < SIDE * SIDE * 3; i++) finite = finite && ssdgs__finite(again[i]);
         CHECK(finite && !memcmp(again, color, sizeof color));
         ssdgs_trainer_destroy(trainer);
         ssdgs_model_destroy(model);
@@ -1658,7 +1658,7 @@ static void test_isolation(void) {
         ssdgs_real eye[3] = {0, 0, 0}, target[3] = {0, 0, 0}, up[3] = {0, 0, 1};
         target[0] = (ssdgs_real)INFINITY;
         ssdgs_camera camera = ssdgs_camera_look_at(eye, target, up, 1, 8, 8);
-        CHECK(ssdgs_finite(camera.view[0]));
+        CHECK(ssdgs__finite(camera.view[0]));
     }
 }
 

@@ -69,7 +69,7 @@ static ssdgs_real draw_real(input *in, double otherwise, double range) {
     float value = (float)edges[byte < 255 ? byte - 192 : 0];
     for (int i = 0; byte == 255 && i < 4; i++) bits |= (uint32_t)draw(in) << 8 * i;
     if (byte == 255) memcpy(&value, &bits, sizeof value);
-    in->tame = in->tame && ssdgs_finite((ssdgs_real)value) && fabs((double)value) <= 1000;
+    in->tame = in->tame && ssdgs__finite((ssdgs_real)value) && fabs((double)value) <= 1000;
     return (ssdgs_real)value;
 }
 
@@ -221,7 +221,7 @@ static void more_light(input *in, ssdgs_light *light) {
 
 static int all_finite(const ssdgs_real *values, size_t count) {
     size_t i = 0;
-    while (i < count && ssdgs_finite(values[i])) i++;
+    while (i < count && ssdgs__finite(values[i])) i++;
     return i == count;
 }
 
@@ -324,7 +324,7 @@ static void drop_picture(picture *p) {
     for (int i = 0; i < PLANES; i++) free(p->planes[i]);
 }
 
-static int is_nan(ssdgs_real value) { return !ssdgs_finite(value) && !(value > 1) && !(value < -1); }
+static int is_nan(ssdgs_real value) { return !ssdgs__finite(value) && !(value > 1) && !(value < -1); }
 
 static void check_picture(const picture *p, int tame) {
     for (int plane = 0; plane < PLANES; plane++)
