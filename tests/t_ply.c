@@ -1271,14 +1271,6 @@ static void test_placed(void) {
     ssdgs_model_destroy(original);
 }
 
-/* Bytes of a number to a file's order, little-endian, and back. */
-static void little(void *number, size_t size) {
-    const int one = 1;
-    unsigned char *p = (unsigned char *)number, kept;
-    for (size_t i = 0; !*(const char *)&one && i < size / 2; i++)
-        kept = p[i], p[i] = p[size - 1 - i], p[size - 1 - i] = kept;
-}
-
 /* A file as versions up to 0.2.4 wrote it: positions far from 0 as doubles, in the world. */
 static bytes old_file(const bytes *file, const ssdgs_real origin[3]) {
     const char *header = (const char *)file->data, *body = strstr(header, "end_header\n") + 11;
@@ -1296,9 +1288,9 @@ static bytes old_file(const bytes *file, const ssdgs_real origin[3]) {
         for (int c = 0; c < 3; c++) {
             float x;
             memcpy(&x, body + 4 * c, 4);
-            little(&x, sizeof x);
+            test_little(&x, sizeof x);
             double there = (double)x + (double)origin[c];
-            little(&there, sizeof there);
+            test_little(&there, sizeof there);
             put(&old, (const char *)&there, 8);
         }
         put(&old, body + 12, row - 12);
@@ -1325,7 +1317,7 @@ static void test_origin(void) {
         CHECK(d.tables > 1 && !strcmp(d.table[1].column[0].name, "version"));
         if (old) { /* the version is the first setting */
             int version = 204;
-            little(&version, sizeof version);
+            test_little(&version, sizeof version);
             memcpy(file.data + (d.table[1].data - file.data), &version, 4);
             const bytes now = file;
             file = old_file(&now, origin);

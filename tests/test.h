@@ -37,6 +37,16 @@ static inline int test_finite(double value) {
     return ((bits >> 52) & 0x7ff) != 0x7ff;
 }
 
+/* Takes a number's bytes to a file's order, little-endian, and back. */
+static inline void test_little(void *number, size_t size) {
+    const int one = 1;
+    unsigned char *p = (unsigned char *)number;
+    for (size_t i = 0; !*(const char *)&one && i < size / 2; i++) {
+        const unsigned char kept = p[i];
+        p[i] = p[size - 1 - i], p[size - 1 - i] = kept;
+    }
+}
+
 /* A number of 0 .. 1 for each counter, in any order. */
 static inline double test_uniform(uint64_t key, uint64_t counter) {
     uint64_t x = key * UINT64_C(0x9E3779B97F4A7C15) + counter;
