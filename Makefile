@@ -114,7 +114,7 @@ test-capture: $(BUILD)/colmap $(BUILD)/check $(BUILD)/train $(BUILD)/relight ## 
 	sh tests/capture.sh $(BUILD) $(BUILD)/capture
 
 test-gpu: $(BUILD)/t_gpu ## examples/gpu on a GPU or in Mesa's software; needs EGL with OpenGL 4.3
-	$(BUILD)/t_gpu
+	$(BUILD)/t_gpu full
 
 test-engine: $(BUILD)/engine_gl ## splats among meshes in an engine's window and OpenGL context; needs SDL2, OpenGL 4.3 and a display, or xvfb-run
 	$(if $(DISPLAY),,xvfb-run -a) $(BUILD)/engine_gl $(BUILD)/engine_gl.png

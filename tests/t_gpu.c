@@ -1,5 +1,6 @@
 /* The GPU's stages (examples/gpu/gpu_gl.c), each alone and whole frames, against the CPU's. Not one of `make
-   test`: it needs EGL with OpenGL 4.3, and Mesa's software renderer does. */
+   test`: it needs EGL with OpenGL 4.3, and Mesa's software renderer does. `t_gpu full` changes scenes
+   more often. */
 #define SSDGS_IMPLEMENTATION
 #include "../ssdgs.h"
 #include "../examples/gpu/gpu_gl.c"
@@ -1771,7 +1772,8 @@ static void one_tile(void) {
     if (!CHECK(light > 0.01 && worst < 1e-3 * light)) printf("    off by %g of %g\n", worst, light);
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+    const int full = argc > 1 && !strcmp(argv[1], "full");
     char message[256] = "";
     without_drivers();
     device = gpu_create(NULL, message, sizeof message);
@@ -1788,7 +1790,7 @@ int main(void) {
         asked_maps();
         dispatches();
         kept();
-        changes(400);
+        changes(full ? 400 : 100);
         in_turn();
         odd_models();
         kept_transport();
