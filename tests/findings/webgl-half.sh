@@ -2,14 +2,15 @@
 # Chromium 156.0.8078.114 (Debian's), WebGL 2: what is too large for a half becomes NaN in the renderer that it brings along, SwiftShader: 70000 in a
 # texture of halves that is filled with floats or drawn into, and by packHalf2x16(); 1000000 and infinity, too, drawn or packed. 65520 and 65536 are
 # infinite. With Mesa's llvmpipe below the same browser textures hold 65504 for all that is finite, packHalf2x16() makes it infinite, and infinity
-# stays. One would guess one of these two, as the value is a number. Splats are blended in pictures of halves: there a bright light is a clipped
-# pixel in one renderer and a NaN in the other, which no blending ends.
+# stays; its textures round towards 0, its packHalf2x16() to the nearest half. One would guess one of these two of both, as the value is a number.
+# Splats are blended in pictures of halves: there a bright light is a clipped pixel in one renderer and in the other a NaN, which no blending ends,
+# and each faint layer darkens the one by up to a thousandth, but not the other.
 . "$(dirname "$0")/lib.sh"
 debian chromium chromium 156.0.8078.114
 need xvfb-run xvfb
 cat >page.html <<'END'
 <!doctype html><pre></pre><script>
-const values = [65504, 65520, 65536, 70000, 1000000, Infinity], n = values.length, lines = [];
+const values = [1 + 3 / 4096, 65504, 65520, 65536, 70000, 1000000, Infinity], n = values.length, lines = [];
 const gl = document.createElement('canvas').getContext('webgl2'), data = new Float32Array(4 * n);
 gl.getExtension('EXT_color_buffer_float');
 values.forEach((v, i) => data[4 * i] = v);
@@ -63,14 +64,14 @@ page --use-gl=angle --use-angle=gl-egl --ignore-gpu-blocklist >>seen
 cat seen
 cat >wanted <<'END'
 SwiftShader
-floats: 65504 65520 65536 70000 1000000 Infinity
-filled: 65504 Infinity Infinity NaN Infinity Infinity
-drawn: 65504 Infinity Infinity NaN NaN NaN
-packed: 65504 Infinity Infinity NaN NaN NaN
+floats: 1.000732421875 65504 65520 65536 70000 1000000 Infinity
+filled: 1.0009765625 65504 Infinity Infinity NaN Infinity Infinity
+drawn: 1.0009765625 65504 Infinity Infinity NaN NaN NaN
+packed: 1.0009765625 65504 Infinity Infinity NaN NaN NaN
 llvmpipe
-floats: 65504 65520 65536 70000 1000000 Infinity
-filled: 65504 65504 65504 65504 65504 Infinity
-drawn: 65504 65504 65504 65504 65504 Infinity
-packed: 65504 Infinity Infinity Infinity Infinity Infinity
+floats: 1.000732421875 65504 65520 65536 70000 1000000 Infinity
+filled: 1 65504 65504 65504 65504 65504 Infinity
+drawn: 1 65504 65504 65504 65504 65504 Infinity
+packed: 1.0009765625 65504 Infinity Infinity Infinity Infinity Infinity
 END
 cmp -s seen wanted
