@@ -5221,8 +5221,8 @@ static void ssdgs__bin_offsets_task(void *data, int index) {
     const int view = frame->batch[0] + index;
     ssdgs_splat_view *v = frame->views + view;
     const int tiles = v->tiles_x * v->tiles_y;
-    uint32_t *place = v->tile_start + 1, sum = 0; /* a tile's list ends where the next one's starts */
     if (v->cached) return;
+    uint32_t *place = v->tile_start + 1, sum = 0; /* a tile's list ends where the next one's starts */
     memset(v->tile_start, 0, ((size_t)tiles + 1) * sizeof *place);
     for (int chunk = 0; chunk < SSDGS__BIN_CHUNKS; chunk++) {
         const uint32_t *counts = ssdgs__histogram(frame, view, chunk);
