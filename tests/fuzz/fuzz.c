@@ -656,7 +656,8 @@ static void fuzz_train(const unsigned char *data, size_t size) {
     if (model && done(context, ssdgs_trainer_create(model, photos, photo_count, &options, &trainer))) {
         trainer->run.iteration = start;
         while (steps-- > 0) step_holds(trainer);
-        HOLDS(model->count <= (options.max_gaussians > 40 ? options.max_gaussians : 40));
+        HOLDS(model->count <= 40 ||
+              model->count <= (double)options.surplus * options.max_gaussians + 0.5); /* before it is lean */
     }
     ssdgs_trainer_destroy(trainer);
     ssdgs_model_destroy(model);
