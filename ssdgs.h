@@ -2975,10 +2975,9 @@ static void ssdgs__turn_to(const ssdgs_real direction[3], const double from[4], 
         for (int j = 0; j < 3; j++) v[i] += (double)r[3 * j + i] * (double)direction[j];
         length += v[i] * v[i];
     }
-    length = sqrt(length);
-    double w = length + v[2], x = -v[1], y = v[0];
-    if (!(length > 0)) w = 1;
-    else if (w <= 1e-9 * length) x = 1, w = y = 0; /* straight back */
+    for (int i = 0; i < 3 && length > 0; i++) v[i] /= sqrt(length); /* what is long would not be finite */
+    double w = 1 + v[2], x = -v[1], y = v[0];
+    if (w <= 1e-9) x = 1, w = y = 0; /* straight back */
     const double b = (double)q[1], c = (double)q[2], d = (double)q[3];
     const double a = fabs((double)q[0]) + fabs(b) + fabs(c) + fabs(d) > 0 ? (double)q[0] : 1; /* r is 1 */
     to[0] = a * w - b * x - c * y;

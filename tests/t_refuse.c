@@ -673,10 +673,12 @@ static void test_gaussian(void) {
     quarter.rotation[0] = quarter.rotation[3] = 1;
     CHECK(!ssdgs_model_set(two, 1, &quarter) && RAW(SSDGS_FRAME) > 0 &&
           fabs(RAW(SSDGS_FRAME + 3) / RAW(SSDGS_FRAME) - 1) < 1e-6);
-    for (int i = 0; i < 2; i++) { /* a normal may have any length */
-        for (int c = 0; c < 3; c++) g.normal[c] = (ssdgs_real)((c - 1) * (i ? 1e25 : 1e-25));
+    for (int i = 0; i < 8; i++) { /* a normal may have any length, and point anywhere */
+        static const double lengths[] = {1e-25, 1, 1e25, 3.4e38};
+        const double side = i & 1 ? -1 : 1;
+        for (int c = 0; c < 3; c++) g.normal[c] = (ssdgs_real)((c - 1) * side * lengths[i / 2]);
         CHECK(!ssdgs_model_set(two, 1, &g) && !ssdgs_model_get(two, 1, &again));
-        CHECK(again.normal[0] < (ssdgs_real)-0.7 && again.normal[2] > (ssdgs_real)0.7);
+        CHECK(side * (double)again.normal[0] < -0.7 && side * (double)again.normal[2] > 0.7);
     }
     /* without a rotation the third axis is the normal, without a normal the normal is the third axis */
     for (int down = 0; down < 2; down++) {
