@@ -2967,15 +2967,15 @@ static double ssdgs__logit(double x) {
    of any length. to may be from. */
 static void ssdgs__turn_to(const ssdgs_real direction[3], const double from[4], double to[4]) {
     ssdgs_real raw[4], q[4], r[9];
-    double v[3], squared = 0; /* the direction in those axes */
+    double v[3]; /* the direction in those axes */
     for (int i = 0; i < 4; i++) raw[i] = (ssdgs_real)from[i];
     ssdgs__rotation_scalar(raw, q, r);
     for (int i = 0; i < 3; i++) {
         v[i] = 0;
         for (int j = 0; j < 3; j++) v[i] += (double)r[3 * j + i] * (double)direction[j];
-        squared += v[i] * v[i];
     }
-    for (int i = 0; i < 3 && squared > 0; i++) v[i] /= sqrt(squared); /* long ones overflow as floats */
+    const double length = hypot(hypot(v[0], v[1]), v[2]);
+    for (int i = 0; i < 3 && length > 0; i++) v[i] /= length; /* a long one's quaternion would be infinite */
     double w = 1 + v[2], x = -v[1], y = v[0];
     if (w <= 1e-9) x = 1, w = y = 0; /* straight back */
     const double b = (double)q[1], c = (double)q[2], d = (double)q[3];
