@@ -249,7 +249,7 @@ static int hull__blocked(const hull *k, const hull__point *p, const double direc
         for (int c = 0; c < 3; c++) {
             const double cell =
                 (p->place[c] + step * (1.7 * p->normal[c] + i * direction[c]) - k->low[c]) / k->cell[c];
-            if (!(cell >= 0 && cell < HULL__GRID)) return 0;
+            if (!(cell >= 0 && cell < (double)HULL__GRID)) return 0;
             at[c] = (int)cell;
         }
         if (hull__inside(k, at)) return 1;
@@ -461,7 +461,7 @@ static double hull__spread(const double (*term)[HULL__TERMS], const double *valu
     double spread = 0;
     for (int i = 0; i < count; i++) weight[i] = 1;
     for (int round = 0; round < rounds; round++) {
-        double a[HULL__TERMS * columns];
+        double a[(int)HULL__TERMS * columns];
         const int wide = 2 * terms + 1;
         memset(a, 0, sizeof a);
         for (int r = 0; r < terms; r++) {
@@ -617,7 +617,7 @@ static double hull__beside(const hull *k, const hull__view *v) {
             seen[r] = (double)camera->view[4 * r + 3];
             for (int c = 0; c < 3; c++)
                 seen[r] += (double)camera->view[4 * r + c] *
-                           (k->low[c] + (corner >> c & 1 ? HULL__GRID * k->cell[c] : 0));
+                           (k->low[c] + (corner >> c & 1 ? (double)HULL__GRID * k->cell[c] : 0));
         }
         if (!(seen[2] > 0)) return 0; /* reaching behind the camera it may be anywhere */
         for (int c = 0; c < 2; c++) {
@@ -661,7 +661,7 @@ static int hull__hull(hull *k) {
             const int first = box[0][c] > 0 ? box[0][c] - 1 : 0,
                       last = box[1][c] < HULL__GRID - 1 ? box[1][c] + 1 : HULL__GRID - 1;
             k->low[c] += first * k->cell[c];
-            k->cell[c] *= (double)(last + 1 - first) / HULL__GRID;
+            k->cell[c] *= (last + 1 - first) / (double)HULL__GRID;
         }
     }
     for (int i = 0; i < n; i++) {
@@ -722,7 +722,7 @@ OLAT__API int hull_judge(const olat_dataset *set, const ssdgs_train_options *opt
     }
     for (int c = 0; c < 3; c++)
         k.low[c] = (double)options->bounds_min[c],
-        k.cell[c] = ((double)options->bounds_max[c] - k.low[c]) / HULL__GRID;
+        k.cell[c] = ((double)options->bounds_max[c] - k.low[c]) / (double)HULL__GRID;
     if (!failed) failed = hull__hull(&k) || hull__edges(&k);
     if (!failed) hull__numbers(&k);
     free(k.views), free(k.curve), free(k.edges), free(k.hull), free(k.points), free(k.cells), free(k.ratio),

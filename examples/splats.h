@@ -133,7 +133,7 @@ static inline const char *splats__header(const unsigned char *bytes, size_t size
                 if (order[i] == which) return "an element stands twice in its header";
             if (which == 3) return "it has an element beside chunk, vertex and sh";
             const double count = strtod(word[2], NULL);
-            if (strspn(word[2], "0123456789") != strlen(word[2]) || count > SPLATS__MOST)
+            if (strspn(word[2], "0123456789") != strlen(word[2]) || count > (double)SPLATS__MOST)
                 return "a count of rows is no number, or too large";
             e[which].count = (size_t)count;
             order[elements++] = which;
