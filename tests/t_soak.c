@@ -35,7 +35,7 @@ enum {
                           : SSDGS_ISA_SSE2
 };
 #ifdef __TINYC__
-enum { SLOW = 4 }; /* no optimiser: shorter runs */
+enum { SLOW = 2 }; /* no optimiser: shorter runs */
 #else
 enum { SLOW = 1 };
 #endif

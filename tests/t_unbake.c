@@ -471,6 +471,7 @@ static void test_edges(void) {
     model = plain_model(context, 3);
     lit = model;
     static const ssdgs_real eye[1][3] = {{0, (ssdgs_real)NAN, 0}};
+    const ssdgs_real unsigned_nan = (ssdgs_real)fabs(NAN); /* tcc's is negative, and messages say so */
     for (int wrong = 0; wrong < 13; wrong++) {
         static const char *const says[13] = {"roughness is neither 0 nor 0.01 .. 1: 2",
                                              "roughness is neither 0 nor 0.01 .. 1: -1",
@@ -486,9 +487,9 @@ static void test_edges(void) {
                                              "kept",
                                              "scattering or absorption is not 0 .. 1e18: -1"};
         options = unbake_options_default();
-        if (wrong < 3) options.roughness = (ssdgs_real)(wrong == 0 ? 2 : wrong == 1 ? -1 : NAN);
-        if (wrong == 3 || wrong == 4) options.f0 = (ssdgs_real)(wrong == 3 ? 2 : NAN);
-        if (wrong == 5) options.ambient[8][1] = (ssdgs_real)NAN;
+        if (wrong < 3) options.roughness = (ssdgs_real)(wrong == 0 ? 2 : wrong == 1 ? -1 : unsigned_nan);
+        if (wrong == 3 || wrong == 4) options.f0 = (ssdgs_real)(wrong == 3 ? 2 : unsigned_nan);
+        if (wrong == 5) options.ambient[8][1] = unsigned_nan;
         if (wrong == 6) options.ambient[0][2] = -5;
         if (wrong == 7) options.ambient[0][0] = (ssdgs_real)INFINITY;
         if (wrong == 8) options.eyes = eye;
