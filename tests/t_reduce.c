@@ -294,6 +294,9 @@ static void test_edges(void) {
         const ssdgs_settings before = *ssdgs_model_settings(models[i]);
         CHECK(reduce_model(contexts[i], &models[i], 0) == SSDGS_ERR_ARGUMENT);
         CHECK(strstr(ssdgs_error_message(contexts[i]), "count < 1") != NULL);
+        CHECK(reduce_model(contexts[i], NULL, 9) == SSDGS_ERR_ARGUMENT);
+        CHECK(strstr(ssdgs_error_message(contexts[i]), "model is NULL") != NULL);
+        CHECK(reduce_model(NULL, &models[i], 9) == SSDGS_ERR_ARGUMENT);
         CHECK(!reduce_model(contexts[i], &models[i], 1500) && ssdgs_model_arrays(models[i]).count == 1500);
         v.gaussians[7] = NAN;                            /* never drawn: it goes */
         v.gaussians[SSDGS_DIFFUSE * v.stride + 9] = NAN; /* drawn black */

@@ -1378,7 +1378,7 @@ static void test_shadow_map_frames(void) {
     }
     CHECK(same(shot, shot + 2));
     make_shadow_map(&from, &map, depth);
-    for (int wrong = 0; wrong < 12; wrong++) {
+    for (int wrong = 0; wrong < 16; wrong++) {
         ssdgs_shadow_map bad = map;
         ssdgs_image image;
         memset(&image, 0, sizeof image);
@@ -1393,6 +1393,10 @@ static void test_shadow_map_frames(void) {
         if (wrong == 7) bad.matrix[15] = (ssdgs_real)NAN;
         if (wrong == 10) bad.pitch = 0;
         if (wrong == 11) bad.pitch = 4 - bad.pitch;
+        if (wrong == 12) bad.width = 32769;
+        if (wrong == 13) bad.height = 0;
+        if (wrong == 14) bad.bias = (ssdgs_real)NAN;
+        if (wrong == 15) bad.range = -1;
         ssdgs_scene_occlude(scene, &occluder);
         CHECK(ssdgs_scene_render(scene, &object, 1, &camera, lights, 2, NULL, &image, NULL) ==
               (wrong == 7 ? SSDGS_ERR_NONFINITE : SSDGS_ERR_ARGUMENT));
@@ -1400,7 +1404,7 @@ static void test_shadow_map_frames(void) {
             printf("    %s\n", ssdgs_error_message(context));
         char pitch[80];
         sprintf(pitch, "pitch = %d, where a row has %d bytes", (int)bad.pitch, 4 * MAP);
-        if (!CHECK(wrong < 10 || strstr(ssdgs_error_message(context), pitch)))
+        if (!CHECK((wrong != 10 && wrong != 11) || strstr(ssdgs_error_message(context), pitch)))
             printf("    %s\n", ssdgs_error_message(context));
     }
     ssdgs_scene_occlude(scene, NULL);
@@ -1781,12 +1785,21 @@ static void test_matrices(void) {
             else worst = off > worst ? off : worst;
         }
         if (!CHECK(worst < 1)) printf("    kind %d: %g\n", kind, worst);
-        CHECK(ssdgs_depth_from_buffer(context, p, 8, buffer, 320, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
-        CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, 320, 0, 50, depth) == SSDGS_ERR_ARGUMENT);
-        CHECK(ssdgs_depth_from_buffer(context, p, 0, NULL, 320, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
-        CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, 320, 1 << 29, 1, depth) == SSDGS_ERR_ARGUMENT);
+        for (int wrong = 0; wrong < 8; wrong++) {
+            static const int sides[8][2] = {{80, 50}, {80, 50},     {80, 50}, {80, 50},
+                                            {0, 50},  {1 << 29, 1}, {80, 0},  {80, 1 << 29}};
+            CHECK(ssdgs_depth_from_buffer(context, wrong == 0 ? NULL : p, wrong == 1 ? 8 : 0,
+                                          wrong == 2 ? NULL : buffer, 320, sides[wrong][0], sides[wrong][1],
+                                          wrong == 3 ? NULL : depth) == SSDGS_ERR_ARGUMENT);
+        }
         CHECK(ssdgs_depth_from_buffer(context, p, 0, buffer, -316, 80, 50, depth) == SSDGS_ERR_ARGUMENT);
         CHECK(strstr(ssdgs_error_message(context), "80 x 50 pixels, pitch -316") != NULL);
+        ssdgs_real flat[16];
+        memcpy(flat, p, sizeof flat);
+        flat[column_major ? 14 : 11] = 0;
+        CHECK(ssdgs_depth_from_buffer(context, flat, flags, buffer, 320, 80, 50, depth) ==
+              SSDGS_ERR_ARGUMENT);
+        CHECK(strstr(ssdgs_error_message(context), "its depths are all the same") != NULL);
         for (int c = 0; c < 2; c++) p[column_major ? 4 * c + 2 : 8 + c] = 0;
         /* the same camera from a world whose x is turned round: left-handed */
         for (int i = 0; i < 3; i++) v[column_major ? i : 4 * i] *= -1;
