@@ -624,15 +624,22 @@ static void test_gaussian(void) {
     } bad[] = {{offsetof(ssdgs_gaussian, position), (double)NAN, "position"},
                {offsetof(ssdgs_gaussian, rotation), (double)NAN, "rotation"},
                {offsetof(ssdgs_gaussian, scale), 0, "scale"},
+               {offsetof(ssdgs_gaussian, scale), (double)INFINITY, "scale"},
                {offsetof(ssdgs_gaussian, normal), (double)NAN, "normal"},
                {offsetof(ssdgs_gaussian, opacity), 1.01, "opacity"},
                {offsetof(ssdgs_gaussian, opacity), (double)NAN, "opacity"},
                {offsetof(ssdgs_gaussian, diffuse), -0.1, "diffuse"},
+               {offsetof(ssdgs_gaussian, diffuse), (double)INFINITY, "diffuse"},
                {offsetof(ssdgs_gaussian, specular), (double)NAN, "specular"},
+               {offsetof(ssdgs_gaussian, specular), (double)INFINITY, "specular"},
                {offsetof(ssdgs_gaussian, scattering), -1, "scatter"},
+               {offsetof(ssdgs_gaussian, scattering), (double)INFINITY, "scatter"},
                {offsetof(ssdgs_gaussian, sharpness), 0, "sharpness"},
+               {offsetof(ssdgs_gaussian, sharpness), (double)INFINITY, "sharpness"},
                {offsetof(ssdgs_gaussian, f0), 0, "f0"},
+               {offsetof(ssdgs_gaussian, f0), 1.01, "f0"},
                {offsetof(ssdgs_gaussian, softness), -1, "softness"},
+               {offsetof(ssdgs_gaussian, softness), 1.01, "softness"},
                {offsetof(ssdgs_gaussian, material), (double)NAN, "material"}};
     const double tolerance = sizeof(ssdgs_real) == 4 ? 2e-6 : 1e-12;
     ssdgs_model *two = NULL;

@@ -1458,11 +1458,26 @@ static void test_spot(void) {
     wrong.kind = SSDGS_LIGHT_SPOT, wrong.cone[1] = 1;
     CHECK(ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(strstr(ssdgs_error_message(context), "light 0: its direction") != NULL);
-    wrong.direction[0] = 1, wrong.cone[0] = 1;
-    CHECK(ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL) == SSDGS_ERR_ARGUMENT);
-    CHECK(strstr(ssdgs_error_message(context), "light 0: the angles of its cone are 1 and 1") != NULL);
-    wrong.cone[0] = 0;
+    wrong.direction[0] = 1, wrong.cone[0] = 0;
     CHECK(!ssdgs_scene_render(scene, NULL, 0, &camera, &wrong, 1, NULL, &image, NULL));
+    for (int i = 0; i < 7; i++) {
+        static const char *const says[7] = {"the angles of its cone are 1 and 1",
+                                            "the angles of its cone are -1 and 1",
+                                            "the angles of its cone are 0 and 4",
+                                            "kind = -1",
+                                            "kind = 99",
+                                            "range = -1",
+                                            "range = inf"};
+        ssdgs_light light = wrong;
+        if (i < 2) light.cone[0] = (ssdgs_real)(i ? -1 : 1);
+        if (i == 2) light.cone[1] = 4;
+        if (i == 3 || i == 4) light.kind = (ssdgs_light_kind)(i == 3 ? -1 : 99);
+        if (i > 4) light.range = (ssdgs_real)(i == 5 ? -1 : INFINITY);
+        CHECK(ssdgs_scene_render(scene, NULL, 0, &camera, &light, 1, NULL, &image, NULL) ==
+              SSDGS_ERR_ARGUMENT);
+        if (!CHECK(strstr(ssdgs_error_message(context), says[i])))
+            printf("    %s\n", ssdgs_error_message(context));
+    }
 }
 
 /* All Gaussians to three standard deviations, strays left out; nothing where there is nothing. */
@@ -1823,6 +1838,8 @@ static void test_matrices(void) {
     }
     const ssdgs_real none[16] = {0};
     CHECK(ssdgs_camera_from_matrices(context, NULL, none, 0, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_camera_from_matrices(context, none, NULL, 0, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
+    CHECK(ssdgs_camera_from_matrices(context, none, none, 0, 80, 50, NULL) == SSDGS_ERR_ARGUMENT);
     CHECK(ssdgs_camera_from_matrices(NULL, none, none, 0, 80, 50, &got) == SSDGS_ERR_ARGUMENT);
 }
 
@@ -2717,11 +2734,16 @@ static void test_refused(void) {
     refused(object, 2, "object 1: to_world[3] is not finite");
     object[1] = good, memset(object[1].to_world, 0, sizeof good.to_world);
     refused(object, 2, "object 1: to_world's scale is 0");
+    object[1] = good;
+    for (int j = 0; j < 3; j++) object[1].to_world[5 * j] = (ssdgs_real)1e13;
+    refused(object, 2, "object 1: to_world's scale is ");
     object[1] = good, object[1].to_world[0] = (ssdgs_real)1.01;
     refused(object, 2, "object 1: to_world is not a rotation times one scale");
     object[1] = good, object[1].to_world[1] = (ssdgs_real)0.01;
     refused(object, 2, "object 1: to_world is not a rotation times one scale");
     object[1] = good, object[1].tint[2] = -1, refused(object, 2, "object 1: tint[2] = -1");
+    object[1] = good, object[1].tint[0] = (ssdgs_real)INFINITY;
+    refused(object, 2, "object 1: tint[0] = inf");
     object[1] = good;
     const ssdgs_camera camera = camera_from(0.4, -2.2, 0.8);
     const ssdgs_image image = planes_of(shot);
