@@ -471,7 +471,8 @@ static void test_edges(void) {
     model = plain_model(context, 3);
     lit = model;
     static const ssdgs_real eye[1][3] = {{0, (ssdgs_real)NAN, 0}};
-    const ssdgs_real unsigned_nan = (ssdgs_real)fabs(NAN); /* tcc's is negative, and messages say so */
+    const ssdgs_real unsigned_nan =
+        (ssdgs_real)fabs((double)NAN); /* tcc's is negative, and messages say so */
     for (int wrong = 0; wrong < 13; wrong++) {
         static const char *const says[13] = {"roughness is neither 0 nor 0.01 .. 1: 2",
                                              "roughness is neither 0 nor 0.01 .. 1: -1",
