@@ -110,11 +110,15 @@ static inline void unbake__copy(const unbake__state *u, ssdgs_model *model) {
                (size_t)u->count * sizeof *to.gaussians);
 }
 
-/* Makes that the context's message, after the function's name, with a number behind it. */
+/* Makes that the context's message, after the function's name, with a number behind it: as the library's,
+   with a point wherever the program's locale has a comma, and nan without a sign. */
 static inline ssdgs_result unbake__refuse(ssdgs_context *context, ssdgs_result result, const char *what,
                                           double number) {
-    char text[256];
-    snprintf(text, sizeof text, "unbake_model: %s%.7g", what, number);
+    char text[256], digits[40];
+    snprintf(digits, sizeof digits, "%.7g", number == number ? number : fabs(number));
+    char *const comma = strchr(digits, ',');
+    if (comma) *comma = '.';
+    snprintf(text, sizeof text, "unbake_model: %s%s", what, digits);
     return ssdgs_context_fail(context, result, text);
 }
 

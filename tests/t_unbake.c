@@ -4,6 +4,7 @@
 #include "../ssdgs.h"
 #include "../examples/unbake.h"
 #include "test.h"
+#include <locale.h>
 
 enum { BALL = 1500, SIDE = 30, PLATE = 2 * SIDE * SIDE };
 
@@ -471,10 +472,9 @@ static void test_edges(void) {
     model = plain_model(context, 3);
     lit = model;
     static const ssdgs_real eye[1][3] = {{0, (ssdgs_real)NAN, 0}};
-    const ssdgs_real unsigned_nan =
-        (ssdgs_real)fabs((double)NAN); /* tcc's is negative, and messages say so */
+    setlocale(LC_ALL, "de_DE.UTF-8"); /* where there is one, it writes 2,5 */
     for (int wrong = 0; wrong < 13; wrong++) {
-        static const char *const says[13] = {"roughness is neither 0 nor 0.01 .. 1: 2",
+        static const char *const says[13] = {"roughness is neither 0 nor 0.01 .. 1: 2.5",
                                              "roughness is neither 0 nor 0.01 .. 1: -1",
                                              "roughness is neither 0 nor 0.01 .. 1: nan",
                                              "f0 is not above 0, up to 1: 2",
@@ -488,9 +488,9 @@ static void test_edges(void) {
                                              "kept",
                                              "scattering or absorption is not 0 .. 1e18: -1"};
         options = unbake_options_default();
-        if (wrong < 3) options.roughness = (ssdgs_real)(wrong == 0 ? 2 : wrong == 1 ? -1 : unsigned_nan);
-        if (wrong == 3 || wrong == 4) options.f0 = (ssdgs_real)(wrong == 3 ? 2 : unsigned_nan);
-        if (wrong == 5) options.ambient[8][1] = unsigned_nan;
+        if (wrong < 3) options.roughness = (ssdgs_real)(wrong == 0 ? 2.5 : wrong == 1 ? -1 : (double)NAN);
+        if (wrong == 3 || wrong == 4) options.f0 = (ssdgs_real)(wrong == 3 ? 2 : NAN);
+        if (wrong == 5) options.ambient[8][1] = (ssdgs_real)NAN;
         if (wrong == 6) options.ambient[0][2] = -5;
         if (wrong == 7) options.ambient[0][0] = (ssdgs_real)INFINITY;
         if (wrong == 8) options.eyes = eye;
@@ -503,6 +503,7 @@ static void test_edges(void) {
         if (!CHECK(strstr(ssdgs_error_message(context), says[wrong])))
             printf("    %d: %s\n", wrong, ssdgs_error_message(context));
     }
+    setlocale(LC_ALL, "C");
     options = unbake_options_default();
     options.ambient[0][0] = options.ambient[0][1] = options.ambient[0][2] = (ssdgs_real)1e-30;
     CHECK(unbake_model(context, model, &options, &lit) &&
